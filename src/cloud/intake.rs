@@ -1,0 +1,525 @@
+//! Is this message one whole revolution that the array can hold? If not, why not.
+
+use super::dialect::DialectDetector;
+use super::sensor::{self, Sensor};
+use super::{CloudParameters, Dialect, MAX_COLUMNS};
+use crate::time::{Span, Time};
+use crate::wire::Envelope;
+use crate::wire::point_cloud::{CompactPointCloud, LAYOUT_RPLIDAR, Schema};
+
+/// Why a sound message is not processed.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    /// From another sensor than the one that is listened to.
+    #[error("from sender {sender_stamp}, while sender {listened} is listened to")]
+    OtherSender {
+        /// Who sent it.
+        sender_stamp: u32,
+        /// Who is listened to.
+        listened: u32,
+    },
+    /// No layers at all, as the first versions of one device service sent.
+    #[error("zero layers")]
+    ZeroLayers,
+    /// No distances.
+    #[error("no distances")]
+    NoDistances,
+    /// The distances are not whole columns.
+    #[error("{bytes} bytes of distances are no whole columns of {layers} layers")]
+    BrokenColumns {
+        /// Length of the distances.
+        bytes: usize,
+        /// Layers in a column.
+        layers: u8,
+    },
+    /// More columns than the array has.
+    #[error("{columns} columns, the array holds {MAX_COLUMNS}")]
+    TooManyColumns {
+        /// Columns in the message.
+        columns: usize,
+    },
+    /// One of the three messages of a sensor with 32 layers.
+    #[error("{layers} of the 32 layers of a {sensor}, the array holds 16")]
+    TooManyLayers {
+        /// Name of the sensor.
+        sensor: &'static str,
+        /// Layers in the message.
+        layers: u8,
+    },
+    /// A number of layers that no table has.
+    #[error("no sensor with {layers} layers is known")]
+    UnknownSensor {
+        /// Layers in the message.
+        layers: u8,
+    },
+    /// A planar scanner with a format of its own.
+    #[error("an RPLidar, which has one layer and floats for distances")]
+    RpLidar,
+    /// Intensity takes all bits, or the schema has a newer encoding.
+    #[error("an encoding of distances that is not known ({intensity_bits} bits of intensity)")]
+    UnknownEncoding {
+        /// Bits of intensity that the message announces.
+        intensity_bits: u8,
+    },
+    /// Not a number, infinite, or far outside a circle.
+    #[error("azimuths from {start_deg} to {end_deg} degrees")]
+    ImpossibleAzimuth {
+        /// First column.
+        start_deg: f32,
+        /// Last column.
+        end_deg: f32,
+    },
+    /// The first message after a device starts claims to begin at 0 wherever it began.
+    #[error("first message of a device: {columns} columns cannot span {span_deg:.1} degrees")]
+    FirstAzimuth {
+        /// Columns in the message.
+        columns: usize,
+        /// What they claim to span.
+        span_deg: f64,
+    },
+    /// The sensor turns at 5 Hz and the device cuts the revolution in two, or a step back in
+    /// azimuth ended the message.
+    #[error("{columns} columns span {span_deg:.1} degrees, no whole revolution")]
+    PartialRevolution {
+        /// Columns in the message.
+        columns: usize,
+        /// What they span.
+        span_deg: f64,
+    },
+    /// Packets were lost on the way to the device.
+    #[error("{step_deg:.4} degrees a column after {usual_deg:.4}: packets were lost")]
+    UnevenStep {
+        /// Step between columns.
+        step_deg: f64,
+        /// Step in the revolutions before.
+        usual_deg: f64,
+    },
+    /// Older than the revolution before, or the same again.
+    #[error("{late_s:.3} s older than the revolution before")]
+    OutOfOrder {
+        /// How much older.
+        late_s: f64,
+    },
+}
+
+impl Refusal {
+    /// A short name for counters and logs.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::OtherSender { .. } => "other_sender",
+            Self::ZeroLayers => "zero_layers",
+            Self::NoDistances => "no_distances",
+            Self::BrokenColumns { .. } => "broken_columns",
+            Self::TooManyColumns { .. } => "too_many_columns",
+            Self::TooManyLayers { .. } => "too_many_layers",
+            Self::UnknownSensor { .. } => "unknown_sensor",
+            Self::RpLidar => "rplidar",
+            Self::UnknownEncoding { .. } => "unknown_encoding",
+            Self::ImpossibleAzimuth { .. } => "impossible_azimuth",
+            Self::FirstAzimuth { .. } => "first_azimuth",
+            Self::PartialRevolution { .. } => "partial_revolution",
+            Self::UnevenStep { .. } => "uneven_step",
+            Self::OutOfOrder { .. } => "out_of_order",
+        }
+    }
+}
+
+/// A message that was taken, with all that the next steps need.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Revolution<'a> {
+    /// The message.
+    pub cloud: CompactPointCloud<'a>,
+    /// Its sensor.
+    pub sensor: &'static Sensor,
+    /// How its distances are written.
+    pub dialect: Dialect,
+    /// Azimuth of the first column, degrees.
+    pub start_deg: f64,
+    /// From one column to the next, degrees; negative when azimuths fall.
+    pub step_deg: f64,
+    /// End of the sweep.
+    pub time: Time,
+    /// Whether time went back or jumped ahead, so that nothing before is of use.
+    pub time_jumped: bool,
+}
+
+/// Longest pause after which older revolutions still mean something, and longest step back in
+/// time that is taken for disorder rather than for a recording that begins again.
+const CONTINUITY: Span = Span::from_micros(1_000_000);
+
+/// Messages from another sender, without one from ours between, after which it is followed.
+const SENDER_PATIENCE: u32 = 20;
+
+/// Keeps what must be known from message to message.
+#[derive(Debug, Clone, Default)]
+pub struct Intake {
+    detector: DialectDetector,
+    listened: Option<u32>,
+    strangers: u32,
+    last_time: Option<Time>,
+    usual_step_deg: Option<f64>,
+    refused_step_deg: Option<f64>,
+}
+
+impl Intake {
+    /// Decides on one message.
+    ///
+    /// # Errors
+    /// [`Refusal`] when it is not a whole revolution that the array can hold.
+    pub fn accept<'a>(
+        &mut self,
+        envelope: &Envelope<'_>,
+        cloud: CompactPointCloud<'a>,
+        parameters: &CloudParameters,
+    ) -> Result<Revolution<'a>, Refusal> {
+        let sensor = check_shape(&cloud)?;
+        let unknown = Refusal::UnknownEncoding {
+            intensity_bits: cloud.intensity_bits,
+        };
+        if cloud.distance_mask() == 0 {
+            return Err(unknown);
+        }
+        self.check_sender(envelope.sender_stamp, parameters)?;
+        let (start_deg, step_deg) = self.check_azimuths(&cloud, parameters)?;
+        let (time, time_jumped) = self.check_time(envelope, &cloud, sensor)?;
+        let dialect = self.detector.dialect(&cloud, parameters).ok_or(unknown)?;
+        self.last_time = Some(time);
+        Ok(Revolution {
+            cloud,
+            sensor,
+            dialect,
+            start_deg,
+            step_deg,
+            time,
+            time_jumped,
+        })
+    }
+
+    fn check_sender(
+        &mut self,
+        sender_stamp: u32,
+        parameters: &CloudParameters,
+    ) -> Result<(), Refusal> {
+        let configured = u32::try_from(parameters.sender_stamp).ok();
+        let listened = configured.or(self.listened).unwrap_or(sender_stamp);
+        if sender_stamp == listened {
+            (self.listened, self.strangers) = (Some(listened), 0);
+            return Ok(());
+        }
+        self.strangers += 1;
+        if configured.is_none() && self.strangers > SENDER_PATIENCE {
+            *self = Self {
+                listened: Some(sender_stamp),
+                ..Self::default()
+            };
+            return Ok(());
+        }
+        Err(Refusal::OtherSender {
+            sender_stamp,
+            listened,
+        })
+    }
+
+    /// First azimuth and step. First and last column are given, those between are linear.
+    fn check_azimuths(
+        &mut self,
+        cloud: &CompactPointCloud<'_>,
+        parameters: &CloudParameters,
+    ) -> Result<(f64, f64), Refusal> {
+        let columns = cloud.columns();
+        let (start_deg, signed_span_deg) = span_deg(cloud)?;
+        let span_deg = signed_span_deg.abs();
+        let step_deg = span_deg / (columns.max(2) - 1) as f64;
+        if span_deg + step_deg < parameters.least_span_deg {
+            return Err(Refusal::PartialRevolution { columns, span_deg });
+        }
+        self.check_step(step_deg, cloud, parameters)?;
+        Ok((start_deg, signed_span_deg / (columns.max(2) - 1) as f64))
+    }
+
+    /// A step that differs from the usual one means wrong azimuths. Two that differ in the
+    /// same way mean another rate of rotation.
+    fn check_step(
+        &mut self,
+        step_deg: f64,
+        cloud: &CompactPointCloud<'_>,
+        parameters: &CloudParameters,
+    ) -> Result<(), Refusal> {
+        let close = |to: f64| (step_deg / to - 1.0).abs() <= parameters.step_tolerance;
+        let fits = match self.usual_step_deg {
+            Some(usual_deg) => close(usual_deg),
+            // A first message is suspect only if it claims to begin exactly at 0.
+            None => cloud.start_azimuth_deg != 0.0 || is_rate_of_rotation(step_deg),
+        };
+        if fits || self.refused_step_deg.is_some_and(close) {
+            (self.usual_step_deg, self.refused_step_deg) = (Some(step_deg), None);
+            return Ok(());
+        }
+        self.refused_step_deg = Some(step_deg);
+        Err(match self.usual_step_deg {
+            Some(usual_deg) if cloud.start_azimuth_deg != 0.0 => Refusal::UnevenStep {
+                step_deg,
+                usual_deg,
+            },
+            _ => Refusal::FirstAzimuth {
+                columns: cloud.columns(),
+                span_deg: step_deg * (cloud.columns().max(2) - 1) as f64,
+            },
+        })
+    }
+
+    /// The end of the sweep. A sender without a clock gets the time that the columns took.
+    fn check_time(
+        &self,
+        envelope: &Envelope<'_>,
+        cloud: &CompactPointCloud<'_>,
+        sensor: &Sensor,
+    ) -> Result<(Time, bool), Refusal> {
+        let time = envelope.time();
+        let Some(last) = self.last_time else {
+            return Ok((time, false));
+        };
+        if time.is_zero() {
+            let sweep_s = cloud.columns() as f64 * sensor.column_period_s;
+            return Ok((last + Span::from_seconds(sweep_s), false));
+        }
+        let passed = time - last;
+        if passed.micros() <= 0 && passed.micros() > -CONTINUITY.micros() {
+            return Err(Refusal::OutOfOrder {
+                late_s: -passed.seconds(),
+            });
+        }
+        Ok((time, passed.micros() < 0 || passed > CONTINUITY))
+    }
+}
+
+/// Everything that one message alone shows.
+fn check_shape(cloud: &CompactPointCloud<'_>) -> Result<&'static Sensor, Refusal> {
+    let layers = cloud.layers;
+    if let Schema::OpenDlv {
+        vertical_layout: LAYOUT_RPLIDAR,
+        ..
+    } = cloud.schema
+    {
+        return Err(Refusal::RpLidar);
+    }
+    if layers == 0 {
+        return Err(Refusal::ZeroLayers);
+    }
+    let sensor = sensor::identify(cloud).ok_or(Refusal::UnknownSensor { layers })?;
+    if *sensor != sensor::VLP16 {
+        return Err(Refusal::TooManyLayers {
+            sensor: sensor.name,
+            layers,
+        });
+    }
+    let bytes = cloud.distances.len();
+    if bytes == 0 {
+        return Err(Refusal::NoDistances);
+    }
+    if bytes % (2 * usize::from(layers)) != 0 {
+        return Err(Refusal::BrokenColumns { bytes, layers });
+    }
+    if cloud.columns() > MAX_COLUMNS {
+        return Err(Refusal::TooManyColumns {
+            columns: cloud.columns(),
+        });
+    }
+    Ok(sensor)
+}
+
+/// First azimuth and signed span. An end below the start is a sweep over 0 while both are on
+/// the circle; with negative azimuths (an early version of the thesis' simulation) it is a
+/// sensor that turns the other way.
+fn span_deg(cloud: &CompactPointCloud<'_>) -> Result<(f64, f64), Refusal> {
+    let (start, end) = (cloud.start_azimuth_deg, cloud.end_azimuth_deg);
+    let possible = -720.0..=720.0;
+    let span_deg = f64::from(end) - f64::from(start);
+    let wraps = span_deg < 0.0 && end >= 0.0;
+    let span_deg = if wraps { span_deg + 360.0 } else { span_deg };
+    // The device service ends a revolution up to one packet (4.8 degrees at 20 Hz) late.
+    if !possible.contains(&start) || !possible.contains(&end) || span_deg.abs() > 365.0 {
+        return Err(Refusal::ImpossibleAzimuth {
+            start_deg: start,
+            end_deg: end,
+        });
+    }
+    Ok((f64::from(start), span_deg))
+}
+
+/// Whether a VLP-16, which turns at a whole number of revolutions a second from 5 to 20,
+/// makes this step between columns. Its motor keeps the rate within 0.3 %.
+fn is_rate_of_rotation(step_deg: f64) -> bool {
+    let rate_hz = step_deg / (360.0 * sensor::VLP16.column_period_s);
+    let nearest_hz = libm::round(rate_hz);
+    (5.0..=20.0).contains(&nearest_hz) && (rate_hz / nearest_hz - 1.0).abs() < 0.015
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Profile;
+    use crate::wire::TimeStamp;
+
+    struct Sender {
+        intake: Intake,
+        parameters: CloudParameters,
+        micros: i64,
+    }
+
+    impl Sender {
+        fn new() -> Self {
+            Self {
+                intake: Intake::default(),
+                parameters: CloudParameters::profile(Profile::Default),
+                micros: 1_700_000_000_000_000,
+            }
+        }
+
+        fn send(&mut self, start: f32, end: f32, columns: usize) -> Result<f64, Refusal> {
+            self.micros += 100_000;
+            self.send_at(self.micros, start, end, columns)
+        }
+
+        fn send_at(
+            &mut self,
+            micros: i64,
+            start: f32,
+            end: f32,
+            columns: usize,
+        ) -> Result<f64, Refusal> {
+            let distances = vec![1; 32 * columns];
+            let cloud = CompactPointCloud {
+                start_azimuth_deg: start,
+                end_azimuth_deg: end,
+                layers: 16,
+                distances: &distances,
+                ..CompactPointCloud::default()
+            };
+            let envelope = Envelope {
+                sample_time_stamp: TimeStamp::from(Time::from_micros(micros)),
+                ..Envelope::default()
+            };
+            let taken = self.intake.accept(&envelope, cloud, &self.parameters);
+            taken.map(|revolution| revolution.step_deg)
+        }
+    }
+
+    fn refused(result: Result<f64, Refusal>) -> &'static str {
+        result.map_or_else(|refusal| refusal.name(), |_| "accepted")
+    }
+
+    #[test]
+    fn a_first_message_whose_azimuth_lies_is_refused_and_the_next_ones_are_not() {
+        let mut sender = Sender::new();
+        assert_eq!(refused(sender.send(0.0, 359.895, 656)), "first_azimuth");
+        assert_eq!(refused(sender.send(0.09, 359.925, 1810)), "accepted");
+        assert_eq!(refused(sender.send(0.12, 359.95, 1811)), "accepted");
+        assert_eq!(refused(sender.send(0.0, 359.895, 900)), "first_azimuth");
+        assert_eq!(refused(sender.send(0.15, 359.93, 1812)), "accepted");
+    }
+
+    #[test]
+    fn synthetic_revolutions_from_zero_are_taken_from_the_first_on() {
+        for columns in [904, 1200, 1800, 1803, 2000] {
+            assert_eq!(refused(Sender::new().send(0.0, 360.0, columns)), "accepted");
+        }
+    }
+
+    #[test]
+    fn an_unusual_step_is_taken_when_it_comes_twice() {
+        let mut sender = Sender::new();
+        assert_eq!(refused(sender.send(0.0, 359.0, 360)), "first_azimuth");
+        assert_eq!(refused(sender.send(0.0, 359.0, 360)), "accepted");
+    }
+
+    #[test]
+    fn lost_packets_and_split_revolutions_are_refused() {
+        let mut sender = Sender::new();
+        assert_eq!(refused(sender.send(0.1, 359.9, 1808)), "accepted");
+        assert_eq!(refused(sender.send(0.1, 359.9, 1784)), "uneven_step");
+        assert_eq!(refused(sender.send(0.1, 359.9, 1808)), "accepted");
+        assert_eq!(refused(sender.send(0.0, 189.6, 1875)), "partial_revolution");
+        assert_eq!(refused(sender.send(187.4, 359.9, 1702)), "partial_revolution");
+    }
+
+    #[test]
+    fn a_sweep_over_zero_and_a_falling_one_keep_their_direction() {
+        let step = 359.8 / 1799.0;
+        let over_zero = Sender::new().send(200.0, 199.8, 1800).unwrap();
+        assert!((over_zero - step).abs() < 1e-6);
+        let falling = Sender::new().send(215.0, -144.8, 1800).unwrap();
+        assert!((falling + step).abs() < 1e-6);
+    }
+
+    #[test]
+    fn impossible_azimuths_are_refused() {
+        for (start, end) in [(f32::NAN, 1.0), (0.0, f32::INFINITY), (0.0, 1e9), (-10.0, 360.0)] {
+            assert_eq!(refused(Sender::new().send(start, end, 1800)), "impossible_azimuth");
+        }
+    }
+
+    #[test]
+    fn disorder_is_refused_and_a_restart_is_not() {
+        let mut sender = Sender::new();
+        let now = sender.micros;
+        assert_eq!(refused(sender.send_at(now, 0.1, 359.9, 1800)), "accepted");
+        assert_eq!(refused(sender.send_at(now, 0.1, 359.9, 1800)), "out_of_order");
+        assert_eq!(refused(sender.send_at(now - 200_000, 0.1, 359.9, 1800)), "out_of_order");
+        assert_eq!(refused(sender.send_at(now - 8_000_000, 0.1, 359.9, 1800)), "accepted");
+        assert_eq!(refused(sender.send_at(now - 7_900_000, 0.1, 359.9, 1800)), "accepted");
+    }
+
+    #[test]
+    fn more_columns_than_the_array_has_are_refused() {
+        assert_eq!(refused(Sender::new().send(0.1, 359.9, 2000)), "accepted");
+        assert_eq!(refused(Sender::new().send(0.1, 359.9, 2001)), "too_many_columns");
+    }
+
+    #[test]
+    fn shapes_that_the_array_cannot_hold_are_refused_by_name() {
+        let shape = |layers, distances, intensity_bits| {
+            let cloud = CompactPointCloud {
+                end_azimuth_deg: 359.8,
+                layers,
+                distances,
+                intensity_bits,
+                ..CompactPointCloud::default()
+            };
+            let parameters = CloudParameters::profile(Profile::Default);
+            let result = Intake::default().accept(&Envelope::default(), cloud, &parameters);
+            result.map_or_else(|refusal| refusal.name(), |_| "accepted")
+        };
+        assert_eq!(shape(0, &[1; 32], 0), "zero_layers");
+        assert_eq!(shape(16, &[], 0), "no_distances");
+        assert_eq!(shape(16, &[1; 33], 0), "broken_columns");
+        assert_eq!(shape(12, &[1; 24], 0), "too_many_layers");
+        assert_eq!(shape(13, &[1; 26], 0), "unknown_sensor");
+        assert_eq!(shape(16, &[1; 64], 16), "unknown_encoding");
+    }
+
+    #[test]
+    fn the_first_sender_is_listened_to_until_it_is_silent() {
+        let mut sender = Sender::new();
+        let distances = [1; 32 * 1800];
+        let mut send = |stamp: u32, micros: i64| {
+            let cloud = CompactPointCloud {
+                end_azimuth_deg: 359.8,
+                layers: 16,
+                distances: &distances,
+                ..CompactPointCloud::default()
+            };
+            let envelope = Envelope {
+                sender_stamp: stamp,
+                sample_time_stamp: TimeStamp::from(Time::from_micros(micros)),
+                ..Envelope::default()
+            };
+            sender.intake.accept(&envelope, cloud, &sender.parameters).is_ok()
+        };
+        assert!(send(3, 1_000_000));
+        assert!(!send(4, 1_050_000));
+        assert!(send(3, 1_100_000));
+        let taken = (0..30).filter(|n| send(4, 1_200_000 + n * 100_000)).count();
+        assert_eq!(taken, 10);
+    }
+}

@@ -1,0 +1,85 @@
+//! Step two: one point cloud message into the static array of points.
+//!
+//! `dialect` finds what the message does not say (byte order) and what it says in two ways
+//! (intensity, unit). `intake` decides whether the message is one whole revolution that the
+//! array can hold, and says why not. `scan` is the array. `sensor` has the elevation tables.
+
+mod dialect;
+
+mod intake;
+
+mod scan;
+
+#[cfg(test)]
+pub(crate) use scan::tests;
+
+pub mod sensor;
+
+pub use dialect::{ByteOrderSource, Dialect};
+pub use intake::{Intake, Refusal, Revolution};
+pub use scan::{CAPACITY, MASKED, MAX_COLUMNS, MAX_LAYERS, Scan};
+
+use crate::config::{choices, parameters};
+
+choices! {
+    /// How the order of the two bytes of a distance is decided.
+    pub enum ByteOrderSetting {
+        /// From the data.
+        Auto = "auto",
+        /// Network order.
+        Big = "big",
+        /// Host order of old recordings.
+        Little = "little",
+    }
+}
+
+choices! {
+    /// How the unit of a distance is decided.
+    pub enum UnitSetting {
+        /// As the message says; centimetres where it says nothing.
+        Auto = "auto",
+        /// 0.01 m.
+        Centimetre = "1cm",
+        /// 0.002 m: opendlv-device-lidar-vlp16 v0.0.2 to v0.0.5.
+        TwoMillimetres = "2mm",
+        /// 0.02 m.
+        TwoCentimetres = "2cm",
+    }
+}
+
+parameters! {
+    /// The point cloud: how messages are read and which returns are kept.
+    pub struct CloudParameters "cloud" {
+        /// Order of the two bytes of a distance. No message says it; auto compares how smooth
+        /// the surfaces are in either order and says in log and Status what it found.
+        byte_order: ByteOrderSetting = ByteOrderSetting::Auto, "";
+        /// Unit of a distance. auto follows the message; where its schema has no unit it is 1cm.
+        distance_unit: UnitSetting = UnitSetting::Auto, "";
+        /// Which sender of a session with several sensors is listened to; -1 takes the first
+        /// one that is heard.
+        sender_stamp: i64 = -1, in -1.0 ..= 4294967295.0, "senderStamp";
+        /// Returns nearer than this are dropped: the vehicle's own roof and the sensor's mount.
+        minimum_range_m: f64 = 1.0, in 0.0..=10.0, "m";
+        /// Returns farther than this are dropped.
+        maximum_range_m: f64 = 130.0, in 1.0..=655.35, "m";
+        /// Box around the own vehicle in the sensor frame (x right, y forward, z up), within
+        /// which returns are dropped: lowest x. The box is empty where low is not below high.
+        vehicle_x_low_m: f64 = 0.0, in -10.0..=10.0, "m";
+        /// Highest x of the own vehicle's box.
+        vehicle_x_high_m: f64 = 0.0, in -10.0..=10.0, "m";
+        /// Lowest y of the own vehicle's box.
+        vehicle_y_low_m: f64 = 0.0, in -20.0..=20.0, "m";
+        /// Highest y of the own vehicle's box.
+        vehicle_y_high_m: f64 = 0.0, in -20.0..=20.0, "m";
+        /// Lowest z of the own vehicle's box.
+        vehicle_z_low_m: f64 = -5.0, in -5.0..=5.0, "m";
+        /// Highest z of the own vehicle's box.
+        vehicle_z_high_m: f64 = 1.0, in -5.0..=5.0, "m";
+        /// How much the step between columns may differ from the revolutions before. Packets
+        /// lost between sensor and device widen it, and azimuths between first and last column
+        /// are then wrong: one packet of 75 widens it by 0.013.
+        step_tolerance: f64 = 0.01, in 0.001..=0.5, "";
+        /// Part of the circle that a message must cover to be a revolution.
+        least_span_deg: f64 = 350.0, in 1.0..=359.0, "degrees";
+    }
+}

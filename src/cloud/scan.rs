@@ -1,0 +1,303 @@
+//! The static array of points that every later step reads.
+
+use super::sensor::{self, Sensor};
+use super::{CloudParameters, Revolution};
+use crate::time::Time;
+
+/// Columns that the array holds (thesis section 4.1.2: `Points[2000][16]`), enough for a
+/// sensor that turns at 9.05 Hz or faster.
+pub const MAX_COLUMNS: usize = 2000;
+/// Layers of a column.
+pub const MAX_LAYERS: usize = 16;
+/// Points that the array holds.
+pub const CAPACITY: usize = MAX_COLUMNS * MAX_LAYERS;
+
+/// The range of a point that has a return which is not used: too near, too far, or on the
+/// own vehicle. A point without a return has the range 0.
+pub const MASKED: f32 = -1.0;
+
+/// One revolution in the sensor frame: x right, y forward, z up. A structure of arrays,
+/// indexed by [`Scan::index`]; made once, filled again for every revolution.
+#[derive(Debug, Clone)]
+pub struct Scan {
+    columns: usize,
+    sensor: &'static Sensor,
+    time: Time,
+    start_rad: f64,
+    step_rad: f64,
+    range_m: Box<[f32]>,
+    x_m: Box<[f32]>,
+    y_m: Box<[f32]>,
+    z_m: Box<[f32]>,
+}
+
+impl Default for Scan {
+    fn default() -> Self {
+        let zeros = || vec![0.0; CAPACITY].into_boxed_slice();
+        Self {
+            columns: 0,
+            sensor: &sensor::VLP16,
+            time: Time::ZERO,
+            start_rad: 0.0,
+            step_rad: 0.0,
+            range_m: zeros(),
+            x_m: zeros(),
+            y_m: zeros(),
+            z_m: zeros(),
+        }
+    }
+}
+
+impl Scan {
+    /// Takes a revolution in. [`super::Intake`] has seen to it that it fits.
+    pub fn fill(&mut self, revolution: &Revolution<'_>, parameters: &CloudParameters) {
+        self.columns = revolution.cloud.columns();
+        self.sensor = revolution.sensor;
+        self.time = revolution.time;
+        self.start_rad = revolution.start_deg.to_radians();
+        self.step_rad = revolution.step_deg.to_radians();
+        self.read_ranges(revolution, parameters);
+        self.place_points();
+        self.mask_vehicle(parameters);
+    }
+
+    /// Distances to metres; what is out of range is masked.
+    fn read_ranges(&mut self, revolution: &Revolution<'_>, parameters: &CloudParameters) {
+        let dialect = revolution.dialect;
+        let kept = parameters.minimum_range_m as f32..=parameters.maximum_range_m as f32;
+        let distances = revolution.cloud.distances.chunks_exact(2);
+        for (range_m, bytes) in self.range_m.iter_mut().zip(distances) {
+            let units = dialect.byte_order.join([bytes[0], bytes[1]]) & dialect.distance_mask;
+            let measured_m = f32::from(units) * dialect.unit_m;
+            *range_m = match units {
+                0 => 0.0,
+                _ if kept.contains(&measured_m) => measured_m,
+                _ => MASKED,
+            };
+        }
+    }
+
+    /// Polar to Cartesian: x = d cos(v) sin(a), y = d cos(v) cos(a), z = d sin(v), with the
+    /// azimuth a clockwise from y. Sine and cosine of the azimuth advance by rotation, in
+    /// double precision: after 2,000 steps they are right to 1e-12.
+    fn place_points(&mut self) {
+        let mut elevation = [(0.0f32, 0.0f32); MAX_LAYERS];
+        for (slot, degrees) in elevation.iter_mut().zip(self.sensor.elevation_deg) {
+            let (sine, cosine) = libm::sincos(degrees.to_radians());
+            *slot = (sine as f32, cosine as f32);
+        }
+        let (mut sine, mut cosine) = libm::sincos(self.start_rad);
+        let (step_sine, step_cosine) = libm::sincos(self.step_rad);
+        for column in 0..self.columns {
+            let (sine_f32, cosine_f32) = (sine as f32, cosine as f32);
+            for (layer, (sine_v, cosine_v)) in elevation.iter().enumerate() {
+                let point = self.index(column, layer);
+                let range_m = self.range_m[point].max(0.0);
+                let horizontal_m = range_m * cosine_v;
+                self.x_m[point] = horizontal_m * sine_f32;
+                self.y_m[point] = horizontal_m * cosine_f32;
+                self.z_m[point] = range_m * sine_v;
+            }
+            (sine, cosine) = (
+                sine * step_cosine + cosine * step_sine,
+                cosine * step_cosine - sine * step_sine,
+            );
+        }
+    }
+
+    fn mask_vehicle(&mut self, parameters: &CloudParameters) {
+        let x = parameters.vehicle_x_low_m as f32..parameters.vehicle_x_high_m as f32;
+        let y = parameters.vehicle_y_low_m as f32..parameters.vehicle_y_high_m as f32;
+        let z = parameters.vehicle_z_low_m as f32..parameters.vehicle_z_high_m as f32;
+        if x.is_empty() || y.is_empty() || z.is_empty() {
+            return;
+        }
+        for point in 0..self.len() {
+            let inside = x.contains(&self.x_m[point])
+                && y.contains(&self.y_m[point])
+                && z.contains(&self.z_m[point]);
+            if inside && self.range_m[point] > 0.0 {
+                self.range_m[point] = MASKED;
+            }
+        }
+    }
+
+    /// Columns of this revolution.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// The sensor that made it.
+    pub fn sensor(&self) -> &'static Sensor {
+        self.sensor
+    }
+
+    /// End of the sweep.
+    pub fn time(&self) -> Time {
+        self.time
+    }
+
+    /// Azimuth of a column in radians, clockwise from y.
+    pub fn azimuth_rad(&self, column: usize) -> f64 {
+        self.start_rad + column as f64 * self.step_rad
+    }
+
+    /// From one column to the next in radians; negative when azimuths fall.
+    pub fn step_rad(&self) -> f64 {
+        self.step_rad
+    }
+
+    /// How long before the end of the sweep a column was measured, in seconds.
+    pub fn age_s(&self, column: usize) -> f64 {
+        (self.columns - 1 - column) as f64 * self.sensor.column_period_s
+    }
+
+    /// Points of this revolution, with and without a return.
+    pub fn len(&self) -> usize {
+        self.columns * MAX_LAYERS
+    }
+
+    /// Whether no revolution was taken in yet.
+    pub fn is_empty(&self) -> bool {
+        self.columns == 0
+    }
+
+    /// Where a point stands in the arrays.
+    pub const fn index(&self, column: usize, layer: usize) -> usize {
+        column * MAX_LAYERS + layer
+    }
+
+    /// The column of a point.
+    pub const fn column(&self, point: usize) -> usize {
+        point / MAX_LAYERS
+    }
+
+    /// The layer of a point.
+    pub const fn layer(&self, point: usize) -> usize {
+        point % MAX_LAYERS
+    }
+
+    /// Ranges in metres: 0 without a return, [`MASKED`] where the return is not used.
+    pub fn range_m(&self) -> &[f32] {
+        &self.range_m[..self.len()]
+    }
+
+    /// To the right, metres.
+    pub fn x_m(&self) -> &[f32] {
+        &self.x_m[..self.len()]
+    }
+
+    /// Forward, metres.
+    pub fn y_m(&self) -> &[f32] {
+        &self.y_m[..self.len()]
+    }
+
+    /// Up, metres.
+    pub fn z_m(&self) -> &[f32] {
+        &self.z_m[..self.len()]
+    }
+
+    /// Whether a point has a return that is used.
+    pub fn has_return(&self, point: usize) -> bool {
+        self.range_m[point] > 0.0
+    }
+
+    /// A point as x, y, z in metres.
+    pub fn point_m(&self, point: usize) -> [f32; 3] {
+        [self.x_m[point], self.y_m[point], self.z_m[point]]
+    }
+
+    /// How many points have a return that is used.
+    pub fn returns(&self) -> usize {
+        self.range_m().iter().filter(|range| **range > 0.0).count()
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::cloud::{ByteOrderSource, Dialect};
+    use crate::config::Profile;
+    use crate::wire::point_cloud::{ByteOrder, CompactPointCloud};
+
+    /// A scan of centimetres, `columns` around the circle.
+    pub(crate) fn scan_of(columns: usize, distance_cm: impl Fn(usize, usize) -> u16) -> Scan {
+        let distances: Vec<u8> = (0..columns * MAX_LAYERS)
+            .flat_map(|point| distance_cm(point / MAX_LAYERS, point % MAX_LAYERS).to_be_bytes())
+            .collect();
+        let mut scan = Scan::default();
+        scan.fill(&revolution(&distances), &CloudParameters::profile(Profile::Default));
+        scan
+    }
+
+    fn revolution(distances: &[u8]) -> Revolution<'_> {
+        let columns = distances.len() / 32;
+        Revolution {
+            cloud: CompactPointCloud {
+                layers: 16,
+                distances,
+                ..CompactPointCloud::default()
+            },
+            sensor: &sensor::VLP16,
+            dialect: Dialect {
+                byte_order: ByteOrder::Big,
+                byte_order_source: ByteOrderSource::Assumed,
+                distance_mask: 0xffff,
+                unit_m: 0.01,
+                intensity_bits: 0,
+            },
+            start_deg: 0.0,
+            step_deg: 360.0 / columns as f64,
+            time: Time::ZERO,
+            time_jumped: false,
+        }
+    }
+
+    #[test]
+    fn forward_is_y_right_is_x_and_up_is_z() {
+        let scan = scan_of(4, |_, _| 1000);
+        let close = |point: usize, expected: [f64; 3]| {
+            let found = scan.point_m(point);
+            for (found, expected) in found.iter().zip(expected) {
+                assert!((f64::from(*found) - expected).abs() < 1e-4, "{found} {expected}");
+            }
+        };
+        let (sine, cosine) = libm::sincos(15f64.to_radians());
+        close(scan.index(0, 15), [0.0, 10.0 * cosine, 10.0 * sine]);
+        close(scan.index(1, 0), [10.0 * cosine, 0.0, -10.0 * sine]);
+        close(scan.index(3, 0), [-10.0 * cosine, 0.0, -10.0 * sine]);
+    }
+
+    #[test]
+    fn rotation_keeps_the_azimuth_of_the_last_column() {
+        let scan = scan_of(2000, |_, _| 5000);
+        let last = scan.index(1999, 8);
+        let azimuth = f64::from(scan.x_m[last]).atan2(f64::from(scan.y_m[last]));
+        assert!((azimuth + 0.18f64.to_radians()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn no_return_near_returns_and_the_own_vehicle_are_told_apart() {
+        let distances: Vec<u8> = [0u16, 99, 100, 300]
+            .iter()
+            .flat_map(|cm| std::iter::repeat_n(cm.to_be_bytes(), 16))
+            .flatten()
+            .collect();
+        let mut parameters = CloudParameters::profile(Profile::Default);
+        (parameters.vehicle_x_low_m, parameters.vehicle_x_high_m) = (-4.0, -2.0);
+        (parameters.vehicle_y_low_m, parameters.vehicle_y_high_m) = (-1.0, 1.0);
+        let mut scan = Scan::default();
+        scan.fill(&revolution(&distances), &parameters);
+        let ranges: Vec<f32> = (0..4).map(|column| scan.range_m()[scan.index(column, 8)]).collect();
+        assert_eq!(ranges, [0.0, MASKED, 1.0, MASKED]);
+        assert_eq!(scan.returns(), 16);
+    }
+
+    #[test]
+    fn a_smaller_revolution_leaves_nothing_of_a_larger_one() {
+        let mut scan = scan_of(2000, |_, _| 5000);
+        let distances = vec![0; 10 * 32];
+        scan.fill(&revolution(&distances), &CloudParameters::profile(Profile::Default));
+        assert_eq!((scan.len(), scan.returns()), (160, 0));
+    }
+}

@@ -1,0 +1,124 @@
+//! Sensors by the elevations of their layers, lowest first, in degrees.
+
+use crate::wire::point_cloud::{CompactPointCloud, LAYOUT_RPLIDAR, LAYOUT_VLP32C, Schema};
+
+/// A sensor, or the part of one that a message carries.
+#[derive(Debug, PartialEq)]
+pub struct Sensor {
+    /// How logs and Status name it.
+    pub name: &'static str,
+    /// Elevation of each layer in degrees.
+    pub elevation_deg: &'static [f64],
+    /// From one column to the next, seconds.
+    pub column_period_s: f64,
+}
+
+/// Velodyne VLP-16: 16 layers from -15 to 15 degrees (user manual, firing every 55.296 us).
+pub static VLP16: Sensor = Sensor {
+    name: "VLP-16",
+    elevation_deg: &[
+        -15.0, -13.0, -11.0, -9.0, -7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0, 9.0, 11.0, 13.0,
+        15.0,
+    ],
+    column_period_s: 55.296e-6,
+};
+
+/// The three messages of a revolution of a Velodyne HDL-32E, in the order in which they come.
+pub static HDL32E: [Sensor; 3] = [
+    Sensor {
+        name: "HDL-32E",
+        elevation_deg: &[
+            -30.67, -29.33, -25.33, -21.33, -17.33, -13.33, -9.33, -5.33, -1.33, 2.67, 6.67, 10.67,
+        ],
+        column_period_s: 46.08e-6,
+    },
+    Sensor {
+        name: "HDL-32E",
+        elevation_deg: &[
+            -28.0, -26.67, -22.67, -18.67, -14.67, -10.67, -6.67, -2.67, 1.33, 5.33, 9.33,
+        ],
+        column_period_s: 46.08e-6,
+    },
+    Sensor {
+        name: "HDL-32E",
+        elevation_deg: &[-24.0, -20.0, -16.0, -12.0, -8.0, -4.0, 0.0, 4.0, 8.0],
+        column_period_s: 46.08e-6,
+    },
+];
+
+/// The three messages of a revolution of a Velodyne VLP-32C, in the order in which they come.
+pub static VLP32C: [Sensor; 3] = [
+    Sensor {
+        name: "VLP-32C",
+        elevation_deg: &[
+            -25.0, -15.639, -7.254, -4.667, -3.333, -2.333, -1.333, -0.333, 0.667, 1.667, 4.667,
+            15.0,
+        ],
+        column_period_s: 55.296e-6,
+    },
+    Sensor {
+        name: "VLP-32C",
+        elevation_deg: &[
+            -11.31, -8.843, -5.333, -3.667, -2.667, -1.667, -0.667, 0.333, 1.333, 3.333, 10.333,
+        ],
+        column_period_s: 55.296e-6,
+    },
+    Sensor {
+        name: "VLP-32C",
+        elevation_deg: &[-6.148, -4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.333, 7.0],
+        column_period_s: 55.296e-6,
+    },
+];
+
+/// The sensor that a message comes from, by its number of layers and its layout; `None` if
+/// no table has it.
+pub fn identify(cloud: &CompactPointCloud<'_>) -> Option<&'static Sensor> {
+    let layout = match cloud.schema {
+        Schema::OpenDlv {
+            vertical_layout, ..
+        } => vertical_layout,
+        Schema::OpenDaVinci { .. } => 0,
+    };
+    let parts = match layout {
+        LAYOUT_RPLIDAR => return None,
+        LAYOUT_VLP32C => &VLP32C,
+        _ => &HDL32E,
+    };
+    std::iter::once(&VLP16)
+        .chain(parts)
+        .find(|sensor| sensor.elevation_deg.len() == usize::from(cloud.layers))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_parts_of_a_32_layer_sensor_are_32_different_rising_elevations() {
+        for parts in [&HDL32E, &VLP32C] {
+            let mut all: Vec<f64> = parts.iter().flat_map(|part| part.elevation_deg).copied().collect();
+            assert!(parts.iter().all(|part| part.elevation_deg.is_sorted()));
+            all.sort_by(f64::total_cmp);
+            all.dedup();
+            assert_eq!(all.len(), 32);
+        }
+    }
+
+    #[test]
+    fn the_layout_tells_32_layer_sensors_apart() {
+        let mut cloud = CompactPointCloud {
+            layers: 12,
+            ..CompactPointCloud::default()
+        };
+        assert_eq!(identify(&cloud), Some(&HDL32E[0]));
+        cloud.schema = Schema::OpenDlv {
+            vertical_layout: LAYOUT_VLP32C,
+            azimuth_angles: &[],
+        };
+        assert_eq!(identify(&cloud), Some(&VLP32C[0]));
+        cloud.layers = 16;
+        assert_eq!(identify(&cloud), Some(&VLP16));
+        cloud.layers = 3;
+        assert_eq!(identify(&cloud), None);
+    }
+}

@@ -1,0 +1,368 @@
+//! DBSCAN over the rows of the array.
+
+use super::partition::Partition;
+use super::window::Windows;
+use super::{ClusterParameters, Clusters};
+use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, Scan};
+
+/// The cluster step. Its buffers are made once.
+#[derive(Debug, Clone)]
+pub struct Dbscan {
+    parameters: ClusterParameters,
+    windows: Windows,
+    rows: Vec<Row>,
+    /// Points that are looked at, in array order.
+    candidates: Vec<u32>,
+    core: Vec<bool>,
+    partition: Partition,
+    /// Cluster of each representative, while clusters are numbered.
+    numbers: Vec<i32>,
+    clusters: Clusters,
+}
+
+/// One layer as a structure of arrays along the columns. Points that are not looked at stand
+/// at infinity, where nothing is their neighbour.
+#[derive(Debug, Clone)]
+struct Row {
+    x_m: Box<[f32; MAX_COLUMNS]>,
+    y_m: Box<[f32; MAX_COLUMNS]>,
+    z_m: Box<[f32; MAX_COLUMNS]>,
+    eps_squared: Box<[f32; MAX_COLUMNS]>,
+}
+
+/// A point with all that its neighbourhood depends on.
+#[derive(Debug, Clone, Copy)]
+struct Centre {
+    column: usize,
+    layer: usize,
+    position_m: [f32; 3],
+    range_m: f32,
+    eps_m: f32,
+}
+
+impl Dbscan {
+    /// A cluster step with its buffers.
+    pub fn new(parameters: &ClusterParameters) -> Self {
+        let row = || Box::new([0.0; MAX_COLUMNS]);
+        Self {
+            parameters: parameters.clone(),
+            windows: Windows::new(parameters),
+            rows: (0..MAX_LAYERS)
+                .map(|_| Row {
+                    x_m: row(),
+                    y_m: row(),
+                    z_m: row(),
+                    eps_squared: row(),
+                })
+                .collect(),
+            candidates: vec![],
+            core: vec![],
+            partition: Partition::default(),
+            numbers: vec![],
+            clusters: Clusters::default(),
+        }
+    }
+
+    /// The clusters of the last revolution.
+    pub fn clusters(&self) -> &Clusters {
+        &self.clusters
+    }
+
+    /// Finds the clusters of the returns that `ground` does not mark.
+    pub fn process(&mut self, scan: &Scan, ground: &[bool]) -> &Clusters {
+        self.windows.prepare(scan);
+        self.gather(scan, ground);
+        self.find_core_points(scan);
+        self.join_core_points(scan);
+        self.number_clusters(scan);
+        self.adopt_border_points(scan);
+        self.collect_points();
+        &self.clusters
+    }
+
+    fn gather(&mut self, scan: &Scan, ground: &[bool]) {
+        self.candidates.clear();
+        for point in 0..scan.len() {
+            let (column, row) = (scan.column(point), &mut self.rows[scan.layer(point)]);
+            if !scan.has_return(point) || ground[point] {
+                row.x_m[column] = f32::INFINITY;
+                continue;
+            }
+            let eps_m = self.parameters.eps_m(scan.range_m()[point]);
+            row.x_m[column] = scan.x_m()[point];
+            row.y_m[column] = scan.y_m()[point];
+            row.z_m[column] = scan.z_m()[point];
+            row.eps_squared[column] = eps_m * eps_m;
+            self.candidates.push(point as u32);
+        }
+    }
+
+    fn centre(&self, scan: &Scan, point: usize) -> Centre {
+        let range_m = scan.range_m()[point];
+        Centre {
+            column: scan.column(point),
+            layer: scan.layer(point),
+            position_m: scan.point_m(point),
+            range_m,
+            eps_m: self.parameters.eps_m(range_m),
+        }
+    }
+
+    fn find_core_points(&mut self, scan: &Scan) {
+        self.core.clear();
+        self.core.resize(scan.len(), false);
+        for point in &self.candidates {
+            let point = *point as usize;
+            let centre = self.centre(scan, point);
+            let needed = self.parameters.min_points(centre.range_m);
+            self.core[point] = self.has_neighbours(&centre, needed);
+        }
+    }
+
+    /// Whether a point has `needed` neighbours, itself included. The own layer comes first: it
+    /// has most of them, and mostly enough.
+    fn has_neighbours(&self, centre: &Centre, needed: u32) -> bool {
+        let mut found = 0;
+        for layer in nearest_first(centre.layer) {
+            let Some(reach) = self.reach(centre, layer) else {
+                continue;
+            };
+            for stretch in self.windows.stretches(centre.column, reach, reach) {
+                found += self.rows[layer].count(stretch, centre);
+                if found >= needed {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    fn reach(&self, centre: &Centre, layer: usize) -> Option<usize> {
+        self.windows
+            .reach(centre.layer, layer, centre.range_m, centre.eps_m)
+    }
+
+    /// Joins every core point with the core points before it. Of two neighbours each is in the
+    /// window of the other, and one of them is the earlier one on the circle.
+    fn join_core_points(&mut self, scan: &Scan) {
+        self.partition.reset(scan.len());
+        for point in &self.candidates {
+            let point = *point as usize;
+            if !self.core[point] {
+                continue;
+            }
+            let centre = self.centre(scan, point);
+            for layer in 0..MAX_LAYERS {
+                let Some(reach) = self.reach(&centre, layer) else {
+                    continue;
+                };
+                for stretch in self.windows.stretches(centre.column, reach, 0) {
+                    let row = &self.rows[layer];
+                    for column in stretch {
+                        let other = scan.index(column, layer);
+                        if self.core[other] && row.squared_distance(column, &centre).is_some() {
+                            self.partition.join(point as u32, other as u32);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Numbers clusters by their first core point.
+    fn number_clusters(&mut self, scan: &Scan) {
+        self.numbers.clear();
+        self.numbers.resize(scan.len(), Clusters::NONE);
+        let labels = &mut self.clusters.labels;
+        labels.clear();
+        labels.resize(scan.len(), Clusters::NONE);
+        let mut clusters = 0;
+        for point in self.candidates.iter().filter(|point| self.core[**point as usize]) {
+            let number = &mut self.numbers[self.partition.find(*point) as usize];
+            if *number == Clusters::NONE {
+                *number = clusters;
+                clusters += 1;
+            }
+            labels[*point as usize] = *number;
+        }
+        self.clusters.ends.clear();
+        self.clusters.ends.resize(clusters as usize, 0);
+    }
+
+    /// A point that is no core point belongs to the cluster of the nearest core point that is
+    /// its neighbour (of equally near ones, the first in the array), else to none.
+    fn adopt_border_points(&mut self, scan: &Scan) {
+        for point in &self.candidates {
+            let point = *point as usize;
+            if self.core[point] {
+                continue;
+            }
+            if let Some(core) = self.nearest_core_point(scan, point) {
+                self.clusters.labels[point] = self.clusters.labels[core];
+            }
+        }
+    }
+
+    fn nearest_core_point(&self, scan: &Scan, point: usize) -> Option<usize> {
+        let centre = self.centre(scan, point);
+        let mut nearest: Option<(f32, usize)> = None;
+        for layer in 0..MAX_LAYERS {
+            let Some(reach) = self.reach(&centre, layer) else {
+                continue;
+            };
+            for stretch in self.windows.stretches(centre.column, reach, reach) {
+                for column in stretch {
+                    let other = scan.index(column, layer);
+                    let distance = self.rows[layer].squared_distance(column, &centre);
+                    if let Some(distance) = distance.filter(|_| self.core[other])
+                        && nearest.is_none_or(|best| (distance, other) < best)
+                    {
+                        nearest = Some((distance, other));
+                    }
+                }
+            }
+        }
+        nearest.map(|(_, point)| point)
+    }
+
+    /// Sorts points into their clusters by counting.
+    fn collect_points(&mut self) {
+        let Clusters {
+            labels,
+            points,
+            ends,
+        } = &mut self.clusters;
+        let labelled = || {
+            let points = self.candidates.iter();
+            points.filter(|point| labels[**point as usize] != Clusters::NONE)
+        };
+        for point in labelled() {
+            ends[labels[*point as usize] as usize] += 1;
+        }
+        let mut total = 0;
+        for end in ends.iter_mut() {
+            // For now where the cluster begins; the loop below moves it to where it ends.
+            total += std::mem::replace(end, total);
+        }
+        points.clear();
+        points.resize(total, 0);
+        for point in labelled() {
+            let end = &mut ends[labels[*point as usize] as usize];
+            points[*end] = *point;
+            *end += 1;
+        }
+    }
+}
+
+impl Row {
+    /// How many points of a stretch are neighbours of a point. Written so that it vectorises.
+    fn count(&self, stretch: std::ops::Range<usize>, centre: &Centre) -> u32 {
+        let [x, y, z] = centre.position_m;
+        let eps_squared = centre.eps_m * centre.eps_m;
+        let points = self.x_m[stretch.clone()]
+            .iter()
+            .zip(&self.y_m[stretch.clone()])
+            .zip(&self.z_m[stretch.clone()])
+            .zip(&self.eps_squared[stretch]);
+        let mut found = 0;
+        for (((x_m, y_m), z_m), other_squared) in points {
+            let (dx, dy, dz) = (x_m - x, y_m - y, z_m - z);
+            let near = dx * dx + dy * dy + dz * dz <= eps_squared.min(*other_squared);
+            found += u32::from(near);
+        }
+        found
+    }
+
+    /// Squared distance of the point in a column, if it is a neighbour.
+    fn squared_distance(&self, column: usize, centre: &Centre) -> Option<f32> {
+        let [x, y, z] = centre.position_m;
+        let (dx, dy, dz) = (
+            self.x_m[column] - x,
+            self.y_m[column] - y,
+            self.z_m[column] - z,
+        );
+        let squared = dx * dx + dy * dy + dz * dz;
+        let eps_squared = (centre.eps_m * centre.eps_m).min(self.eps_squared[column]);
+        (squared <= eps_squared).then_some(squared)
+    }
+}
+
+/// All layers, beginning with one and going outward.
+fn nearest_first(layer: usize) -> impl Iterator<Item = usize> {
+    let outward = (1..MAX_LAYERS).flat_map(move |step| [layer.checked_sub(step), Some(layer + step)]);
+    std::iter::once(layer).chain(outward.flatten().filter(|layer| *layer < MAX_LAYERS))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::tests::scan_of;
+    use crate::config::Profile;
+
+    fn cluster(scan: &Scan, profile: Profile) -> Clusters {
+        let ground = vec![false; scan.len()];
+        Dbscan::new(&ClusterParameters::profile(profile)).process(scan, &ground).clone()
+    }
+
+    #[test]
+    fn two_posts_apart_are_two_clusters_and_a_stray_return_is_none() {
+        let scan = scan_of(1800, |column, layer| match (column, layer) {
+            (100..110, 4..9) | (200..210, 4..9) => 1000,
+            (900, 3) => 1000,
+            _ => 0,
+        });
+        let clusters = cluster(&scan, Profile::Default);
+        assert_eq!(clusters.iter().map(<[u32]>::len).collect::<Vec<_>>(), [50, 50]);
+        assert_eq!(clusters.labels()[scan.index(900, 3)], Clusters::NONE);
+        assert_eq!(clusters.labels()[scan.index(205, 6)], 1);
+        assert!(clusters.points(1).is_sorted());
+    }
+
+    #[test]
+    fn the_azimuth_seam_is_no_edge() {
+        for profile in Profile::ALL {
+            let scan = scan_of(1800, |column, layer| match (column, layer) {
+                (1795.. | ..5, 6..9) => 1000,
+                _ => 0,
+            });
+            assert_eq!(cluster(&scan, profile).len(), 1);
+        }
+    }
+
+    #[test]
+    fn ground_is_not_clustered() {
+        let scan = scan_of(1800, |_, _| 1000);
+        let ground: Vec<bool> = (0..scan.len()).map(|point| scan.column(point) > 50).collect();
+        let mut dbscan = Dbscan::new(&ClusterParameters::profile(Profile::Default));
+        let clusters = dbscan.process(&scan, &ground);
+        assert_eq!(clusters.len(), 1);
+        assert_eq!(clusters.points(0).len(), 51 * 16);
+    }
+
+    #[test]
+    fn a_wall_close_by_stays_whole_where_a_fixed_window_tears_it() {
+        // Every sixth column returns: more than two columns apart, yet within eps.
+        let scan = scan_of(1800, |column, layer| match (column % 6, layer) {
+            (0, 5..8) if column < 120 => 500,
+            _ => 0,
+        });
+        assert_eq!(cluster(&scan, Profile::Default).len(), 1);
+        assert_eq!(cluster(&scan, Profile::Thesis).len(), 0);
+    }
+
+    #[test]
+    fn a_pedestrian_at_forty_metres_is_a_cluster() {
+        let scan = scan_of(1800, |column, layer| match (column, layer) {
+            (300..304, 7) => 4000,
+            _ => 0,
+        });
+        assert_eq!(cluster(&scan, Profile::Default).len(), 1);
+    }
+
+    #[test]
+    fn nearest_layers_come_first() {
+        let order: Vec<usize> = nearest_first(14).collect();
+        assert_eq!(order[..5], [14, 13, 15, 12, 11]);
+        assert_eq!(order.len(), 16);
+    }
+}

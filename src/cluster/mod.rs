@@ -1,0 +1,105 @@
+//! Step four: returns above the ground that belong together (thesis section 4.1.2).
+//!
+//! DBSCAN (Ester et al. 1996) without a tree: the array is sorted by azimuth and elevation
+//! already, so that the neighbours of a point stand in a few short stretches of its rows.
+//! `window` says in which, `dbscan` is the algorithm, `partition` joins core points.
+
+mod dbscan;
+
+mod partition;
+
+mod window;
+
+pub use dbscan::Dbscan;
+
+use crate::config::{choices, parameters};
+
+choices! {
+    /// Where neighbours of a point are looked for.
+    pub enum WindowSetting {
+        /// Wherever they can be: the result is DBSCAN.
+        Exact = "exact",
+        /// A fixed number of columns to either side, in all layers, as in the thesis. Nearby
+        /// surfaces then fall apart where their columns stand closer than eps.
+        Columns = "columns",
+    }
+}
+
+parameters! {
+    /// The clusters: DBSCAN over the returns that are not ground.
+    pub struct ClusterParameters "cluster" {
+        /// Where neighbours of a point are looked for.
+        window: WindowSetting = WindowSetting::Exact, thesis WindowSetting::Columns, "";
+        /// Columns to either side when window is "columns": 2 makes 5 x 16 = 80 candidates.
+        window_columns: usize = 2, in 1..=200, "columns";
+        /// Distance within which two returns are neighbours, at range 0.
+        eps_m: f64 = 0.6, thesis 1.8, in 0.05..=5.0, "m";
+        /// What is added to that distance for each metre of range; of two returns, the nearer
+        /// one's counts. Layers are 0.035 m apart for each metre.
+        eps_per_m: f64 = 0.01, thesis 0.0, in 0.0..=0.1, "m/m";
+        /// Neighbours, itself included, that make a return a core point near the sensor.
+        min_points: usize = 8, thesis 5, in 1..=100, "returns";
+        /// The same far from the sensor, where a pedestrian returns 7 points in all.
+        min_points_far: usize = 3, thesis 5, in 1..=100, "returns";
+        /// Range up to which min_points holds; behind it the number falls with 1/range, as the
+        /// columns on a target do.
+        min_points_range_m: f64 = 10.0, in 1.0..=100.0, "m";
+    }
+}
+
+impl ClusterParameters {
+    /// Neighbour distance of a return at a range.
+    fn eps_m(&self, range_m: f32) -> f32 {
+        self.eps_m as f32 + self.eps_per_m as f32 * range_m
+    }
+
+    /// Neighbours that make a return at a range a core point.
+    fn min_points(&self, range_m: f32) -> u32 {
+        let scaled = self.min_points as f32 * self.min_points_range_m as f32 / range_m;
+        let bounded = scaled.min(self.min_points as f32).max(self.min_points_far as f32);
+        // Rounded half up, in integers only.
+        (bounded + 0.5) as u32
+    }
+}
+
+/// Clusters of one revolution: labels on the array, and the points of each, in array order.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Clusters {
+    labels: Vec<i32>,
+    points: Vec<u32>,
+    ends: Vec<usize>,
+}
+
+impl Clusters {
+    /// The label of a point that belongs to no cluster.
+    pub const NONE: i32 = -1;
+
+    /// How many clusters there are.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// The cluster of every point of the scan, or [`Clusters::NONE`].
+    pub fn labels(&self) -> &[i32] {
+        &self.labels
+    }
+
+    /// The points of a cluster in array order.
+    pub fn points(&self, cluster: usize) -> &[u32] {
+        let start = match cluster {
+            0 => 0,
+            _ => self.ends[cluster - 1],
+        };
+        &self.points[start..self.ends[cluster]]
+    }
+
+    /// All clusters, ordered by their first core point.
+    pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        (0..self.len()).map(|cluster| self.points(cluster))
+    }
+}

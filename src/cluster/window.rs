@@ -1,0 +1,150 @@
+//! In which columns of which layers the neighbours of a point can stand.
+
+use std::ops::Range;
+
+use super::{ClusterParameters, WindowSetting};
+use crate::cloud::{MAX_LAYERS, Scan};
+
+/// Finds windows that hold every neighbour of a point, from the geometry of the rays alone.
+#[derive(Debug, Clone)]
+pub(super) struct Windows {
+    setting: WindowSetting,
+    fixed_columns: usize,
+    columns: usize,
+    step_rad: f32,
+    /// Columns by which the end of the sweep overlaps its beginning.
+    overlap: usize,
+    sine: [f32; MAX_LAYERS],
+    cosine: [f32; MAX_LAYERS],
+}
+
+/// Chords up to this length are at most 1.0472 times shorter than their arc.
+const LONGEST_CHORD: f32 = 1.0;
+const ARC_PER_CHORD: f32 = 1.0472;
+
+impl Windows {
+    pub(super) fn new(parameters: &ClusterParameters) -> Self {
+        Self {
+            setting: parameters.window,
+            fixed_columns: parameters.window_columns,
+            columns: 0,
+            step_rad: 0.0,
+            overlap: 0,
+            sine: [0.0; MAX_LAYERS],
+            cosine: [0.0; MAX_LAYERS],
+        }
+    }
+
+    /// Takes over the geometry of a revolution.
+    pub(super) fn prepare(&mut self, scan: &Scan) {
+        self.columns = scan.columns();
+        self.step_rad = libm::fabs(scan.step_rad()) as f32;
+        let turn_rad = scan.columns() as f64 * libm::fabs(scan.step_rad());
+        let over_rad = (turn_rad - std::f64::consts::TAU).max(0.0);
+        self.overlap = libm::ceil(over_rad / libm::fabs(scan.step_rad()).max(1e-9)) as usize;
+        for (layer, degrees) in scan.sensor().elevation_deg.iter().enumerate() {
+            let (sine, cosine) = libm::sincos(degrees.to_radians());
+            (self.sine[layer], self.cosine[layer]) = (sine as f32, cosine as f32);
+        }
+    }
+
+    /// How many columns to either side of a point at `range_m` in `layer` can hold a return of
+    /// `other` within `eps_m`; `None` if none can, however far.
+    ///
+    /// A return on a ray is at least r sin(g) away, g being the angle between the rays, so
+    /// only rays with cos(g) >= sqrt(1 - (eps / r)^2) count; and cos(g) = sin v sin w +
+    /// cos v cos w cos(d) for elevations v, w and an azimuth difference d.
+    pub(super) fn reach(
+        &self,
+        layer: usize,
+        other: usize,
+        range_m: f32,
+        eps_m: f32,
+    ) -> Option<usize> {
+        if self.setting == WindowSetting::Columns {
+            return Some(self.fixed_columns.min(self.columns / 2));
+        }
+        let ratio = eps_m / range_m;
+        if ratio >= 1.0 {
+            return Some(self.columns / 2);
+        }
+        let least_cosine = (1.0 - ratio * ratio).sqrt();
+        let cosine_d = (least_cosine - self.sine[layer] * self.sine[other])
+            / (self.cosine[layer] * self.cosine[other]);
+        // Rounding must not lose a neighbour that is exactly eps away.
+        let chord_squared = 2.0 * (1.0 - cosine_d) + 1e-6;
+        if chord_squared < 0.0 {
+            return None;
+        }
+        if chord_squared > LONGEST_CHORD * LONGEST_CHORD {
+            return Some(self.columns / 2);
+        }
+        let arc_rad = ARC_PER_CHORD * chord_squared.sqrt();
+        let reach = (arc_rad / self.step_rad) as usize + 1 + self.overlap;
+        Some(reach.min(self.columns / 2))
+    }
+
+    /// The columns from `reach` before to `after` behind a column, over the seam at 0: at
+    /// most two stretches, the second one often empty.
+    pub(super) fn stretches(
+        &self,
+        column: usize,
+        reach: usize,
+        after: usize,
+    ) -> [Range<usize>; 2] {
+        let columns = self.columns;
+        if reach + after + 1 >= columns {
+            return [0..columns, 0..0];
+        }
+        let (low, high) = (column + columns - reach, column + columns + after + 1);
+        if low >= columns && high > 2 * columns {
+            [low - columns..columns, 0..high - 2 * columns]
+        } else if low < columns {
+            [low..columns, 0..high - columns]
+        } else {
+            [low - columns..high - columns, 0..0]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::tests::scan_of;
+    use crate::config::Profile;
+
+    fn windows(columns: usize, profile: Profile) -> Windows {
+        let mut windows = Windows::new(&ClusterParameters::profile(profile));
+        windows.prepare(&scan_of(columns, |_, _| 0));
+        windows
+    }
+
+    #[test]
+    fn the_seam_is_no_edge() {
+        let windows = windows(100, Profile::Default);
+        assert_eq!(windows.stretches(50, 3, 2), [47..53, 0..0]);
+        assert_eq!(windows.stretches(1, 3, 3), [98..100, 0..5]);
+        assert_eq!(windows.stretches(98, 3, 3), [95..100, 0..2]);
+        assert_eq!(windows.stretches(99, 0, 0), [99..100, 0..0]);
+        assert_eq!(windows.stretches(5, 50, 50), [0..100, 0..0]);
+    }
+
+    #[test]
+    fn the_reach_shrinks_with_range_and_with_the_distance_of_layers() {
+        let windows = windows(1800, Profile::Default);
+        let own = windows.reach(8, 8, 10.0, 0.5).unwrap();
+        assert!((15..=18).contains(&own), "{own}");
+        assert!(windows.reach(8, 9, 10.0, 0.5).unwrap() < own);
+        assert_eq!(windows.reach(8, 10, 10.0, 0.5), None);
+        assert!(windows.reach(8, 8, 40.0, 0.5).unwrap() <= 6);
+        assert_eq!(windows.reach(8, 0, 0.4, 0.5), Some(900));
+    }
+
+    #[test]
+    fn the_thesis_looks_at_eighty_candidates() {
+        let windows = windows(1800, Profile::Thesis);
+        let reaches: Vec<_> = (0..16).map(|other| windows.reach(3, other, 20.0, 1.8)).collect();
+        assert_eq!(reaches, [Some(2); 16]);
+        assert_eq!(windows.stretches(100, 2, 2)[0].len() * 16, 80);
+    }
+}

@@ -1,0 +1,138 @@
+//! What a user may set. Each stage declares its parameters once, with both profiles' values,
+//! range, unit and meaning ([`parameters!`]); printing, reading and checking follow from that.
+
+mod parameter;
+
+#[cfg(feature = "shell")]
+pub mod text;
+
+pub(crate) use parameter::{choices, parameters};
+pub use parameter::{Description, Domain, Problem, Profile, Section, Setting, Value, parse};
+
+use crate::cloud::CloudParameters;
+use crate::cluster::ClusterParameters;
+use crate::ground::GroundParameters;
+use crate::publish::PublishParameters;
+use crate::track::TrackParameters;
+
+parameters! {
+    /// The session on the network. Nothing here changes what is perceived.
+    pub struct SessionParameters "session" {
+        /// Hops that our datagrams may take. 1 keeps them on the local network.
+        ttl: usize = 1, in 0..=255, "hops";
+        /// Receive buffer to ask of the kernel. It grants at most net.core.rmem_max (unless
+        /// the process may override it); a revolution takes about 0.06 MB of data and 0.13 MB
+        /// of buffer.
+        receive_buffer_mb: f64 = 16.0, in 0.2..=256.0, "MB";
+        /// Revolutions that may wait for the pipeline. When another one comes, the oldest is
+        /// dropped and counted.
+        queue_revolutions: usize = 8, in 1..=64, "revolutions";
+    }
+}
+
+/// Every parameter of the service. A value that came through [`text`] is within its range.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Configuration {
+    /// Where values that are not given come from.
+    pub profile: Profile,
+    /// Step one behind the wire.
+    pub cloud: CloudParameters,
+    /// Ground plane.
+    pub ground: GroundParameters,
+    /// DBSCAN.
+    pub cluster: ClusterParameters,
+    /// Identities and objects.
+    pub track: TrackParameters,
+    /// What is sent.
+    pub publish: PublishParameters,
+    /// The network.
+    pub session: SessionParameters,
+}
+
+impl Configuration {
+    /// A built-in profile.
+    pub fn profile(profile: Profile) -> Self {
+        Self {
+            profile,
+            cloud: CloudParameters::profile(profile),
+            ground: GroundParameters::profile(profile),
+            cluster: ClusterParameters::profile(profile),
+            track: TrackParameters::profile(profile),
+            publish: PublishParameters::profile(profile),
+            session: SessionParameters::profile(profile),
+        }
+    }
+
+    /// The sections in the order in which a revolution meets them.
+    pub fn sections(&self) -> [&dyn Section; 6] {
+        let Self {
+            profile: _,
+            cloud,
+            ground,
+            cluster,
+            track,
+            publish,
+            session,
+        } = self;
+        [cloud, ground, cluster, track, publish, session]
+    }
+
+    /// The same, to be set.
+    pub fn sections_mut(&mut self) -> [&mut dyn Section; 6] {
+        let Self {
+            profile: _,
+            cloud,
+            ground,
+            cluster,
+            track,
+            publish,
+            session,
+        } = self;
+        [cloud, ground, cluster, track, publish, session]
+    }
+}
+
+impl Default for Configuration {
+    fn default() -> Self {
+        Self::profile(Profile::Default)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_profiles_lie_within_every_range() {
+        for profile in [Profile::Default, Profile::Thesis] {
+            let mut configuration = Configuration::profile(profile);
+            for section in configuration.sections_mut() {
+                for (index, description) in section.descriptions().iter().enumerate() {
+                    let value = section.get(index);
+                    let result = section.set(index, value);
+                    assert!(result.is_ok(), "{} {result:?}", description.key);
+                }
+            }
+            assert_eq!(configuration, Configuration::profile(profile));
+        }
+    }
+
+    #[test]
+    fn every_parameter_says_what_it_means() {
+        for section in Configuration::default().sections() {
+            for description in section.descriptions() {
+                assert!(!description.meaning.is_empty(), "{}", description.key);
+            }
+        }
+    }
+
+    #[test]
+    fn a_value_out_of_range_is_refused_with_range_and_unit() {
+        let mut configuration = Configuration::default();
+        let [.., session] = configuration.sections_mut();
+        let problem = session.set(0, Value::Integer(256)).unwrap_err();
+        assert_eq!(problem.to_string(), "256 is outside 0 to 255 hops");
+        let problem = session.set(0, Value::Text("one".into())).unwrap_err();
+        assert_eq!(problem.to_string(), "\"one\" is not a whole number from 0 to 255 hops");
+    }
+}

@@ -1,0 +1,385 @@
+//! The table form in which stages declare their parameters.
+
+use std::fmt;
+
+/// Where values come from that nobody set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Profile {
+    /// The best that has been measured.
+    Default,
+    /// The thesis' algorithm with the thesis' numbers (Scholle 2017).
+    Thesis,
+}
+
+impl Profile {
+    /// All of them.
+    pub const ALL: [Profile; 2] = [Profile::Default, Profile::Thesis];
+
+    /// The name in configuration files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Default => "default",
+            Self::Thesis => "thesis",
+        }
+    }
+}
+
+/// A parameter's value in the terms of a configuration file.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// `true` or `false`.
+    Bool(bool),
+    /// A whole number.
+    Integer(i64),
+    /// A number.
+    Real(f64),
+    /// A word.
+    Text(String),
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Bool(value) => write!(f, "{value}"),
+            Self::Integer(value) => write!(f, "{value}"),
+            Self::Real(value) => write!(f, "{value:?}"),
+            Self::Text(value) => write!(f, "{value:?}"),
+        }
+    }
+}
+
+/// What a file says about one parameter.
+#[derive(Debug, Clone, Copy)]
+pub struct Description {
+    /// Name in the file.
+    pub key: &'static str,
+    /// What it means and what follows from it, a line of the declaration each.
+    pub meaning: &'static [&'static str],
+    /// Unit, or empty.
+    pub unit: &'static str,
+    /// What it may be.
+    pub domain: Domain,
+}
+
+/// What a parameter may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Domain {
+    /// `true` or `false`.
+    Switch,
+    /// A whole number within bounds, both included.
+    Whole(f64, f64),
+    /// A number within bounds, both included.
+    Real(f64, f64),
+    /// One of these words.
+    Choice(&'static [&'static str]),
+}
+
+impl fmt::Display for Domain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Switch => write!(f, "true or false"),
+            Self::Whole(low, high) | Self::Real(low, high) => write!(f, "{low} to {high}"),
+            Self::Choice(names) => write!(f, "{}", names.join(", ")),
+        }
+    }
+}
+
+/// Why a value cannot be a parameter's.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Problem {
+    /// Of the right type, but too small or too large.
+    #[error("{value} is outside {domain}{}", spaced(.unit))]
+    OutOfRange {
+        /// What was given.
+        value: Value,
+        /// What may be given.
+        domain: Domain,
+        /// Its unit.
+        unit: &'static str,
+    },
+    /// Of another type, or not one of the words.
+    #[error("{value} is not {}", wanted(.domain, .unit))]
+    WrongType {
+        /// What was given.
+        value: Value,
+        /// What may be given.
+        domain: Domain,
+        /// Its unit.
+        unit: &'static str,
+    },
+}
+
+fn spaced(unit: &str) -> String {
+    if unit.is_empty() {
+        String::new()
+    } else {
+        format!(" {unit}")
+    }
+}
+
+fn wanted(domain: &Domain, unit: &str) -> String {
+    match domain {
+        Domain::Switch => "true or false".into(),
+        Domain::Whole(..) => format!("a whole number from {domain}{}", spaced(unit)),
+        Domain::Real(..) => format!("a number from {domain}{}", spaced(unit)),
+        Domain::Choice(_) => format!("one of {domain}"),
+    }
+}
+
+/// A group of parameters that belong to one stage.
+pub trait Section {
+    /// Its heading in the file.
+    fn name(&self) -> &'static str;
+    /// What the stage is.
+    fn meaning(&self) -> &'static [&'static str];
+    /// Its parameters in the order of declaration.
+    fn descriptions(&self) -> Vec<Description>;
+    /// The value of a parameter by its place in [`Section::descriptions`].
+    fn get(&self, index: usize) -> Value;
+    /// Sets a parameter by its place in [`Section::descriptions`].
+    ///
+    /// # Errors
+    /// [`Problem`] when the value is of another type or out of range.
+    fn set(&mut self, index: usize, value: Value) -> Result<(), Problem>;
+}
+
+/// A type that a parameter may have.
+pub trait Setting: Sized {
+    /// What values of the type may be, given the declared bounds.
+    fn domain(bounds: Option<(f64, f64)>) -> Domain;
+    /// As a file writes it.
+    fn to_value(&self) -> Value;
+    /// From what a file says, if the type fits.
+    fn from_value(value: &Value) -> Option<Self>;
+    /// The number that bounds apply to.
+    fn number(&self) -> Option<f64> {
+        None
+    }
+}
+
+impl Setting for bool {
+    fn domain(_bounds: Option<(f64, f64)>) -> Domain {
+        Domain::Switch
+    }
+
+    fn to_value(&self) -> Value {
+        Value::Bool(*self)
+    }
+
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Bool(value) => Some(*value),
+            _ => None,
+        }
+    }
+}
+
+macro_rules! whole_setting {
+    ($($type:ty)*) => {$(
+        impl Setting for $type {
+            fn domain(bounds: Option<(f64, f64)>) -> Domain {
+                let (low, high) = bounds.unwrap_or((0.0, i64::MAX as f64));
+                Domain::Whole(low, high)
+            }
+
+            fn to_value(&self) -> Value {
+                Value::Integer(*self as i64)
+            }
+
+            fn from_value(value: &Value) -> Option<Self> {
+                match value {
+                    Value::Integer(value) => <$type>::try_from(*value).ok(),
+                    _ => None,
+                }
+            }
+
+            fn number(&self) -> Option<f64> {
+                Some(*self as f64)
+            }
+        }
+    )*};
+}
+
+whole_setting!(usize i64);
+
+impl Setting for f64 {
+    fn domain(bounds: Option<(f64, f64)>) -> Domain {
+        let (low, high) = bounds.unwrap_or((f64::MIN, f64::MAX));
+        Domain::Real(low, high)
+    }
+
+    fn to_value(&self) -> Value {
+        Value::Real(*self)
+    }
+
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Real(value) => Some(*value),
+            Value::Integer(value) => Some(*value as f64),
+            _ => None,
+        }
+    }
+
+    fn number(&self) -> Option<f64> {
+        Some(*self)
+    }
+}
+
+/// Parses and checks one value.
+pub fn parse<T: Setting>(
+    value: Value,
+    bounds: Option<(f64, f64)>,
+    unit: &'static str,
+) -> Result<T, Problem> {
+    let domain = T::domain(bounds);
+    let Some(setting) = T::from_value(&value) else {
+        // A negative whole number is out of range, not of another type.
+        return Err(match (&value, domain) {
+            (Value::Integer(_), Domain::Whole(..)) => Problem::OutOfRange {
+                value,
+                domain,
+                unit,
+            },
+            _ => Problem::WrongType {
+                value,
+                domain,
+                unit,
+            },
+        });
+    };
+    let inside = match (setting.number(), bounds) {
+        (Some(number), Some((low, high))) => (low..=high).contains(&number),
+        _ => true,
+    };
+    if inside {
+        Ok(setting)
+    } else {
+        Err(Problem::OutOfRange {
+            value,
+            domain,
+            unit,
+        })
+    }
+}
+
+/// Declares a parameter struct: meaning, `name: type = default, thesis value, in range, "unit";`.
+/// `thesis` may be left out where both profiles agree.
+macro_rules! parameters {
+    (
+        $(#[doc = $section_doc:literal])*
+        pub struct $name:ident $section:literal {
+            $(
+                $(#[doc = $doc:literal])*
+                $field:ident: $type:ty = $default:expr
+                    $(, thesis $thesis:expr)?
+                    $(, in $low:literal ..= $high:literal)?
+                    , $unit:literal;
+            )*
+        }
+    ) => {
+        $(#[doc = $section_doc])*
+        #[derive(Debug, Clone, PartialEq)]
+        pub struct $name {
+            $( $(#[doc = $doc])* #[doc = concat!("\nUnit: ", $unit)] pub $field: $type, )*
+        }
+
+        impl $name {
+            /// The values of a built-in profile.
+            #[allow(unused_mut, unused_assignments, clippy::allow_attributes)]
+            pub fn profile(profile: $crate::config::Profile) -> Self {
+                let thesis = profile == $crate::config::Profile::Thesis;
+                Self {
+                    $( $field: {
+                        let mut value: $type = $default;
+                        $( if thesis { value = $thesis; } )?
+                        let _ = thesis;
+                        value
+                    }, )*
+                }
+            }
+        }
+
+        impl $crate::config::Section for $name {
+            fn name(&self) -> &'static str {
+                $section
+            }
+
+            fn meaning(&self) -> &'static [&'static str] {
+                &[$($section_doc),*]
+            }
+
+            fn descriptions(&self) -> Vec<$crate::config::Description> {
+                vec![$( $crate::config::Description {
+                    key: stringify!($field),
+                    meaning: &[$($doc),*],
+                    unit: $unit,
+                    domain: <$type as $crate::config::Setting>::domain(
+                        $crate::config::parameters!(@bounds $($low, $high)?)
+                    ),
+                }, )*]
+            }
+
+            fn get(&self, index: usize) -> $crate::config::Value {
+                [$( $crate::config::Setting::to_value(&self.$field), )*][index].clone()
+            }
+
+            #[allow(unused_assignments, clippy::allow_attributes)]
+            fn set(
+                &mut self,
+                index: usize,
+                value: $crate::config::Value,
+            ) -> Result<(), $crate::config::Problem> {
+                let mut position = 0;
+                $(
+                    if index == position {
+                        self.$field = $crate::config::parse(
+                            value,
+                            $crate::config::parameters!(@bounds $($low, $high)?),
+                            $unit,
+                        )?;
+                        return Ok(());
+                    }
+                    position += 1;
+                )*
+                Ok(())
+            }
+        }
+    };
+    (@bounds) => { None };
+    (@bounds $low:literal, $high:literal) => { Some(($low as f64, $high as f64)) };
+}
+pub(crate) use parameters;
+
+/// Declares an enum whose variants are words in a configuration file.
+macro_rules! choices {
+    (
+        $(#[$meta:meta])*
+        pub enum $name:ident { $( $(#[$variant_meta:meta])* $variant:ident = $word:literal, )* }
+    ) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum $name { $( $(#[$variant_meta])* $variant, )* }
+
+        impl $crate::config::Setting for $name {
+            fn domain(_bounds: Option<(f64, f64)>) -> $crate::config::Domain {
+                $crate::config::Domain::Choice(&[$($word),*])
+            }
+
+            fn to_value(&self) -> $crate::config::Value {
+                let word = match self { $( Self::$variant => $word, )* };
+                $crate::config::Value::Text(word.into())
+            }
+
+            fn from_value(value: &$crate::config::Value) -> Option<Self> {
+                match value {
+                    $crate::config::Value::Text(word) => match word.as_str() {
+                        $( $word => Some(Self::$variant), )*
+                        _ => None,
+                    },
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+pub(crate) use choices;

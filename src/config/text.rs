@@ -1,0 +1,230 @@
+//! Configuration files: TOML with a comment per value, written and read.
+
+use std::fmt::Write as _;
+
+use toml::de::{DeTable, DeValue};
+
+use super::{Configuration, Problem, Profile, Value};
+
+/// What is wrong with a configuration file.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ConfigError {
+    /// It is not TOML.
+    #[error("line {line}: {message}")]
+    Syntax {
+        /// Counted from 1.
+        line: usize,
+        /// What the parser says.
+        message: String,
+    },
+    /// A name that does not exist.
+    #[error("line {line}: there is no {what} \"{name}\"; there are {known}")]
+    Unknown {
+        /// Counted from 1.
+        line: usize,
+        /// Section or parameter.
+        what: &'static str,
+        /// What was written.
+        name: String,
+        /// What could have been.
+        known: String,
+    },
+    /// A value that cannot be.
+    #[error("line {line}: {section}.{key}: {problem}")]
+    Value {
+        /// Counted from 1.
+        line: usize,
+        /// Section of the parameter.
+        section: &'static str,
+        /// Name of the parameter.
+        key: &'static str,
+        /// What is wrong with it.
+        problem: Problem,
+    },
+}
+
+/// The whole configuration as TOML; [`parse`] gives it back.
+pub fn print(configuration: &Configuration) -> String {
+    let mut out = String::new();
+    let _ = writeln!(out, "# Where values come from that are not given here: default, thesis.");
+    let _ = writeln!(out, "profile = \"{}\"", configuration.profile.name());
+    for section in configuration.sections() {
+        let _ = writeln!(out);
+        comment(&mut out, section.meaning());
+        let _ = writeln!(out, "[{}]", section.name());
+        for (index, parameter) in section.descriptions().iter().enumerate() {
+            let _ = writeln!(out);
+            comment(&mut out, parameter.meaning);
+            let unit = match parameter.unit {
+                "" => String::new(),
+                unit => format!("Unit: {unit}. "),
+            };
+            let _ = writeln!(out, "# {unit}Range: {}.", parameter.domain);
+            let _ = writeln!(out, "{} = {}", parameter.key, section.get(index));
+        }
+    }
+    out
+}
+
+fn comment(out: &mut String, lines: &[&str]) {
+    for line in lines {
+        let _ = writeln!(out, "#{line}");
+    }
+}
+
+/// Reads a configuration. Values that are not given come from the named profile.
+///
+/// # Errors
+/// [`ConfigError`] with the line of the first thing that is wrong.
+pub fn parse(text: &str) -> Result<Configuration, ConfigError> {
+    let document = DeTable::parse(text).map_err(|error| ConfigError::Syntax {
+        line: line_of(text, error.span().map_or(0, |span| span.start)),
+        message: error.message().replace('\n', " "),
+    })?;
+    let mut configuration = Configuration::profile(profile(text, document.get_ref())?);
+    for (name, content) in document.get_ref() {
+        let line = line_of(text, name.span().start);
+        let name = name.get_ref().as_ref();
+        if name != "profile" {
+            read_section(text, &mut configuration, line, name, content.get_ref())?;
+        }
+    }
+    Ok(configuration)
+}
+
+fn profile(text: &str, document: &DeTable<'_>) -> Result<Profile, ConfigError> {
+    let Some(value) = document.get("profile") else {
+        return Ok(Profile::Default);
+    };
+    let written = plain(value.get_ref());
+    Profile::ALL
+        .into_iter()
+        .find(|profile| written == Value::Text(profile.name().into()))
+        .ok_or_else(|| ConfigError::Unknown {
+            line: line_of(text, value.span().start),
+            what: "profile",
+            name: written.to_string().trim_matches('"').into(),
+            known: Profile::ALL.map(Profile::name).join(", "),
+        })
+}
+
+fn read_section(
+    text: &str,
+    configuration: &mut Configuration,
+    line: usize,
+    name: &str,
+    content: &DeValue<'_>,
+) -> Result<(), ConfigError> {
+    let known = configuration.sections().map(|section| section.name());
+    let section = configuration
+        .sections_mut()
+        .into_iter()
+        .find(|section| section.name() == name);
+    let (Some(section), DeValue::Table(table)) = (section, content) else {
+        return Err(ConfigError::Unknown {
+            line,
+            what: "section",
+            name: name.into(),
+            known: known.join(", "),
+        });
+    };
+    let descriptions = section.descriptions();
+    for (key, value) in table {
+        let (key_line, value_line) = (
+            line_of(text, key.span().start),
+            line_of(text, value.span().start),
+        );
+        let found = descriptions
+            .iter()
+            .position(|parameter| parameter.key == key.get_ref().as_ref());
+        let index = found.ok_or_else(|| ConfigError::Unknown {
+            line: key_line,
+            what: "parameter",
+            name: format!("{name}.{}", key.get_ref()),
+            known: descriptions
+                .iter()
+                .map(|parameter| parameter.key)
+                .collect::<Vec<_>>()
+                .join(", "),
+        })?;
+        section
+            .set(index, plain(value.get_ref()))
+            .map_err(|problem| ConfigError::Value {
+                line: value_line,
+                section: section.name(),
+                key: descriptions[index].key,
+                problem,
+            })?;
+    }
+    Ok(())
+}
+
+/// A TOML value in our terms; what no parameter can be becomes a word that says so.
+fn plain(value: &DeValue<'_>) -> Value {
+    let number = |digits: &str| digits.parse::<f64>().ok();
+    match value {
+        DeValue::Boolean(value) => Value::Bool(*value),
+        DeValue::String(value) => Value::Text(value.to_string()),
+        DeValue::Integer(value) => i64::from_str_radix(value.as_str(), value.radix())
+            .map_or_else(|_| Value::Text(value.to_string()), Value::Integer),
+        DeValue::Float(value) => number(value.as_str())
+            .filter(|value| value.is_finite())
+            .map_or_else(|| Value::Text(value.to_string()), Value::Real),
+        DeValue::Array(_) => Value::Text("a list".into()),
+        DeValue::Table(_) => Value::Text("a table".into()),
+        DeValue::Datetime(value) => Value::Text(value.to_string()),
+    }
+}
+
+fn line_of(text: &str, offset: usize) -> usize {
+    let offset = offset.min(text.len());
+    1 + text.as_bytes()[..offset]
+        .iter()
+        .filter(|byte| **byte == b'\n')
+        .count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_printed_is_read_back_unchanged() {
+        for profile in Profile::ALL {
+            let configuration = Configuration::profile(profile);
+            assert_eq!(parse(&print(&configuration)), Ok(configuration));
+        }
+    }
+
+    #[test]
+    fn a_wrong_value_is_named_with_line_range_and_unit() {
+        let error = parse("[session]\n# far\nttl = 300\n").unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "line 3: session.ttl: 300 is outside 0 to 255 hops"
+        );
+        let error = parse("[session]\nttl = -1\n").unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "line 2: session.ttl: -1 is outside 0 to 255 hops"
+        );
+        let error = parse("[session]\nreceive_buffer_mb = nan\n").unwrap_err();
+        assert!(error.to_string().starts_with("line 2: session.receive_buffer_mb: \"nan\""));
+    }
+
+    #[test]
+    fn unknown_names_are_answered_with_the_known_ones() {
+        let error = parse("\n[sesion]\nttl = 1\n").unwrap_err().to_string();
+        assert!(error.starts_with("line 2: there is no section \"sesion\""), "{error}");
+        let error = parse("[session]\nhops = 1\n").unwrap_err().to_string();
+        assert!(error.contains("there is no parameter \"session.hops\"; there are ttl"), "{error}");
+        let error = parse("profile = \"fast\"").unwrap_err().to_string();
+        assert!(error.contains("there is no profile \"fast\""), "{error}");
+    }
+
+    #[test]
+    fn a_syntax_error_names_its_line() {
+        let error = parse("[session]\nttl == 1\n").unwrap_err();
+        assert!(error.to_string().starts_with("line 2: "), "{error}");
+    }
+}

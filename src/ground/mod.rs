@@ -1,0 +1,267 @@
+//! Step three: the ground as a plane, and which returns lie on it (thesis section 4.1.1).
+//!
+//! `minima` gathers the lowest returns of every pie slice, `ransac` finds the plane that most
+//! of them lie on, `plane` has the geometry, this file follows the plane from revolution to
+//! revolution and marks the points.
+
+mod minima;
+
+mod plane;
+
+mod ransac;
+
+pub use plane::Plane;
+
+use crate::cloud::Scan;
+use crate::config::{choices, parameters};
+use crate::random::Random;
+use minima::Minima;
+
+choices! {
+    /// How the error of a candidate plane is summed.
+    pub enum Scoring {
+        /// Squared distances of all minima, as in the thesis.
+        All = "all",
+        /// The same, but none counts for more than a point at the inlier distance
+        /// (MSAC; Torr, Zisserman 2000): cars and kerbs do not pull the choice.
+        Truncated = "truncated",
+    }
+}
+
+parameters! {
+    /// The ground plane: RANSAC over the lowest returns, refined by least squares.
+    pub struct GroundParameters "ground" {
+        /// Pie slices of the circle. In each the lowest returns are gathered, so that they do
+        /// not all come from one place.
+        segments: usize = 36, in 6..=360, "";
+        /// Lowest returns of a slice that are kept.
+        lowest_per_segment: usize = 10, in 1..=64, "returns";
+        /// Horizontal range within which lowest returns are sought. Farther out a slope or a
+        /// distant hollow is lower than the road around the vehicle.
+        candidate_range_m: f64 = 25.0, thesis 130.0, in 5.0..=200.0, "m";
+        /// Random draws of three returns.
+        iterations: usize = 50, in 1..=1000, "";
+        /// Distance to a candidate plane within which a lowest return supports it.
+        inlier_distance_m: f64 = 0.15, thesis 0.2, in 0.01..=1.0, "m";
+        /// Part of the lowest returns that must support a plane.
+        least_support: f64 = 0.25, thesis 0.0, in 0.0..=1.0, "";
+        /// How the error of a candidate plane is summed.
+        scoring: Scoring = Scoring::Truncated, thesis Scoring::All, "";
+        /// Least height of the sensor above a plausible plane.
+        height_low_m: f64 = 0.4, thesis 1.9, in 0.0..=10.0, "m";
+        /// Greatest height of the sensor above a plausible plane.
+        height_high_m: f64 = 4.0, thesis 2.2, in 0.1..=20.0, "m";
+        /// Greatest tilt of a plausible plane against the sensor.
+        tilt_high_deg: f64 = 12.0, thesis 90.0, in 0.5..=90.0, "degrees";
+        /// Whether the plane is followed: once found, lowest returns are judged by their
+        /// height above the last plane, and the next one must be near it.
+        follow: bool = true, thesis false, "";
+        /// How much the height may change from revolution to revolution.
+        follow_height_m: f64 = 0.25, in 0.01..=5.0, "m";
+        /// How much the tilt may change from revolution to revolution.
+        follow_tilt_deg: f64 = 4.0, in 0.1..=45.0, "degrees";
+        /// Revolutions in a row without a plausible plane after which it is sought anew,
+        /// within the whole range of heights and tilts.
+        follow_patience: usize = 10, in 1..=1000, "revolutions";
+        /// Height of the sensor that is taken when no plane was ever plausible.
+        fallback_height_m: f64 = 1.9, thesis 2.05, in 0.1..=10.0, "m";
+        /// Distance to the plane within which a return is ground.
+        mark_distance_m: f64 = 0.2, thesis 0.5, in 0.01..=2.0, "m";
+        /// What is added to that distance for each metre of range: a real road bends away
+        /// from any plane.
+        mark_distance_per_m: f64 = 0.005, thesis 0.0, in 0.0..=0.1, "m/m";
+        /// Whether everything below the plane is ground, too. It is no road user: it is a
+        /// ditch, a slope, or a reflection in a wet road.
+        below_is_ground: bool = true, thesis false, "";
+        /// Seed of the draws. The same seed and recording give the same planes.
+        seed: usize = 1, "";
+    }
+}
+
+/// Where a revolution's plane comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Origin {
+    /// Found in this revolution.
+    Found,
+    /// No plane was plausible: the last good one.
+    Held,
+    /// No plane was ever plausible: level, at the configured height.
+    Fallback,
+}
+
+/// What the ground step says about a revolution.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GroundReport {
+    /// The plane that was used.
+    pub plane: Plane,
+    /// Where it comes from.
+    pub origin: Origin,
+    /// Lowest returns that were gathered.
+    pub candidates: usize,
+    /// How many of them lie on the plane.
+    pub support: usize,
+    /// Points marked as ground.
+    pub points: usize,
+}
+
+/// The ground step: follows the plane and owns the mask.
+#[derive(Debug, Clone)]
+pub struct Ground {
+    parameters: GroundParameters,
+    last: Option<Plane>,
+    misses: usize,
+    revolutions: u64,
+    minima: Minima,
+    mask: Vec<bool>,
+}
+
+impl Ground {
+    /// A ground step that knows nothing yet.
+    pub fn new(parameters: &GroundParameters) -> Self {
+        Self {
+            parameters: parameters.clone(),
+            last: None,
+            misses: 0,
+            revolutions: 0,
+            minima: Minima::new(parameters.segments, parameters.lowest_per_segment),
+            mask: Vec::with_capacity(crate::cloud::CAPACITY),
+        }
+    }
+
+    /// Forgets the plane, for a session that begins anew.
+    pub fn reset(&mut self) {
+        (self.last, self.misses) = (None, 0);
+    }
+
+    /// Which points of the last revolution are ground.
+    pub fn mask(&self) -> &[bool] {
+        &self.mask
+    }
+
+    /// Finds the plane of a revolution and marks its points.
+    pub fn process(&mut self, scan: &Scan) -> GroundReport {
+        let followed = self.last.filter(|_| self.parameters.follow);
+        let reference = followed.unwrap_or(Plane::level(0.0));
+        self.minima.gather(scan, &reference, self.parameters.candidate_range_m);
+        let mut random = Random::new(self.parameters.seed as u64 ^ self.revolutions << 20);
+        let near = followed.filter(|_| self.misses < self.parameters.follow_patience);
+        let found = ransac::find(&self.minima, near.as_ref(), &self.parameters, &mut random);
+        self.revolutions += 1;
+
+        let (plane, origin) = match (found, self.last) {
+            (Some(plane), _) => (plane, Origin::Found),
+            (None, Some(last)) => (last, Origin::Held),
+            (None, None) => (
+                Plane::level(self.parameters.fallback_height_m),
+                Origin::Fallback,
+            ),
+        };
+        self.misses = if found.is_some() { 0 } else { self.misses + 1 };
+        self.last = found.or(self.last);
+        GroundReport {
+            plane,
+            origin,
+            candidates: self.minima.len(),
+            support: self.minima.support(&plane, self.parameters.inlier_distance_m),
+            points: self.mark(scan, &plane),
+        }
+    }
+
+    fn mark(&mut self, scan: &Scan, plane: &Plane) -> usize {
+        let [a, b, c] = plane.normal().map(|component| component as f32);
+        let height_m = plane.height_m() as f32;
+        let near_m = self.parameters.mark_distance_m as f32;
+        let per_m = self.parameters.mark_distance_per_m as f32;
+        let below = self.parameters.below_is_ground;
+        let (range_m, x_m, y_m, z_m) = (scan.range_m(), scan.x_m(), scan.y_m(), scan.z_m());
+        self.mask.clear();
+        self.mask.extend((0..scan.len()).map(|point| {
+            let above_m = a * x_m[point] + b * y_m[point] + c * z_m[point] + height_m;
+            let limit_m = near_m + per_m * range_m[point];
+            range_m[point] > 0.0 && above_m <= limit_m && (below || above_m >= -limit_m)
+        }));
+        self.mask.iter().filter(|ground| **ground).count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::sensor::VLP16;
+    use crate::cloud::tests::scan_of;
+    use crate::config::Profile;
+
+    /// Centimetres to a plane at `height_m`, tilted by `tilt_deg` towards forward.
+    fn tilted_road(height_m: f64, tilt_deg: f64) -> Scan {
+        scan_of(1800, |column, layer| {
+            let azimuth = (column as f64 * 0.2).to_radians();
+            let elevation = VLP16.elevation_deg[layer].to_radians();
+            let (sine, cosine) = tilt_deg.to_radians().sin_cos();
+            // The ray's slope towards the plane's normal.
+            let descent = -(elevation.sin() * cosine + elevation.cos() * azimuth.cos() * sine);
+            let wall = column % 180 < 30 && layer > 4;
+            let range = if wall { 8.0 } else { height_m / descent };
+            if (1.0..100.0).contains(&range) { (range * 100.0).round() as u16 } else { 0 }
+        })
+    }
+
+    fn process(scan: &Scan, profile: Profile) -> GroundReport {
+        Ground::new(&GroundParameters::profile(profile)).process(scan)
+    }
+
+    #[test]
+    fn height_and_tilt_are_found_whatever_the_vehicle() {
+        for (height_m, tilt_deg) in [(0.8, 0.0), (1.6, 3.0), (2.05, -2.0), (3.2, 5.0)] {
+            let report = process(&tilted_road(height_m, tilt_deg), Profile::Default);
+            assert_eq!(report.origin, Origin::Found);
+            assert!((report.plane.height_m() - height_m).abs() < 0.03, "{report:?}");
+            assert!((report.plane.tilt_rad().to_degrees() - tilt_deg.abs()).abs() < 0.3);
+        }
+    }
+
+    #[test]
+    fn the_thesis_gate_holds_for_one_car_only() {
+        assert_eq!(process(&tilted_road(2.05, 0.0), Profile::Thesis).origin, Origin::Found);
+        let report = process(&tilted_road(1.6, 0.0), Profile::Thesis);
+        assert_eq!(report.origin, Origin::Fallback);
+        assert_eq!(report.plane.height_m(), 2.05);
+    }
+
+    #[test]
+    fn the_last_good_plane_is_held_when_none_is_plausible() {
+        let mut ground = Ground::new(&GroundParameters::profile(Profile::Default));
+        let found = ground.process(&tilted_road(1.6, 0.0));
+        let held = ground.process(&scan_of(1800, |_, _| 0));
+        assert_eq!(held.origin, Origin::Held);
+        assert_eq!(held.plane, found.plane);
+    }
+
+    #[test]
+    fn a_nod_is_followed_and_a_leap_is_not_until_patience_ends() {
+        let mut ground = Ground::new(&GroundParameters::profile(Profile::Default));
+        ground.process(&tilted_road(1.6, 0.0));
+        assert_eq!(ground.process(&tilted_road(1.65, 2.0)).origin, Origin::Found);
+        let leap = tilted_road(2.6, 2.0);
+        let origins: Vec<_> = (0..11).map(|_| ground.process(&leap).origin).collect();
+        assert_eq!(origins[..10], [Origin::Held; 10]);
+        assert_eq!(origins[10], Origin::Found);
+    }
+
+    #[test]
+    fn road_is_marked_and_walls_are_not() {
+        let scan = tilted_road(1.6, 2.0);
+        let mut ground = Ground::new(&GroundParameters::profile(Profile::Default));
+        let report = ground.process(&scan);
+        assert_eq!(report.points, ground.mask().iter().filter(|mark| **mark).count());
+        assert!(ground.mask()[scan.index(100, 2)]);
+        assert!(!ground.mask()[scan.index(10, 9)]);
+        // No return is no ground.
+        assert!(!ground.mask()[scan.index(100, 15)]);
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_plane() {
+        let scan = tilted_road(1.9, 1.0);
+        assert_eq!(process(&scan, Profile::Default), process(&scan, Profile::Default));
+    }
+}

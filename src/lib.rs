@@ -1,0 +1,51 @@
+//! Kreisel takes each revolution of a Velodyne VLP-16 from an OpenDaVINCI or OpenDLV
+//! session and answers it with a list of the objects around the vehicle.
+//!
+//! A revolution walks through the house once, front to back:
+//!
+//! ```text
+//! datagram -> wire -> cloud -> ground -> cluster -> track -> wire -> datagram
+//! ```
+//!
+//! Everything but the shell is pure: no I/O, no clock, no thread, no global state. The same
+//! envelopes and the same configuration give the same bytes.
+#![cfg_attr(
+    test,
+    allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)
+)]
+
+// Bytes to messages, messages to bytes.
+pub mod wire;
+
+// A message to the static array of points.
+pub mod cloud;
+
+// Which points are ground.
+pub mod ground;
+
+// Which of the others belong together.
+pub mod cluster;
+
+// Which cluster is which object, from revolution to revolution.
+pub mod track;
+
+// Objects to messages, messages to frames.
+pub mod publish;
+
+// The steps above, in order.
+pub mod pipeline;
+
+// What a user may set, with unit and range, and the two profiles.
+pub mod config;
+
+// Counters by name.
+pub mod tally;
+
+// Integer microseconds.
+pub mod time;
+
+// The generator behind every random choice.
+pub mod random;
+
+// A synthetic session with truth.
+pub mod simulate;

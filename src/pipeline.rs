@@ -1,0 +1,296 @@
+//! All the steps, in order. This is the one place that names them all.
+
+use crate::cloud::{Dialect, Intake, Refusal, Revolution, Scan};
+use crate::cluster::Dbscan;
+use crate::config::Configuration;
+use crate::ground::{Ground, GroundReport, Origin};
+use crate::publish::{Heading, Publisher};
+use crate::tally::Tally;
+use crate::time::Time;
+use crate::track::{Object, Tracker};
+use crate::wire::point_cloud::{CompactPointCloud, POINT_CLOUD_ID};
+use crate::wire::status::Status;
+use crate::wire::{Envelope, Message, WireError, pose};
+
+/// Message numbers that are ours: what we send, heard back.
+const OWN_IDS: std::ops::RangeInclusive<i32> = 2020..=2039;
+
+/// The whole of perception: an envelope in, envelopes out.
+///
+/// [`Pipeline::handle`] takes every envelope of the session in the order in which they come.
+/// When it answers [`Outcome::Revolution`], [`Pipeline::publish`] makes the frames to send.
+/// Neither knows a clock: the caller says when it is.
+#[derive(Debug, Clone)]
+pub struct Pipeline {
+    configuration: Configuration,
+    intake: Intake,
+    scan: Scan,
+    ground: Ground,
+    clusters: Dbscan,
+    tracker: Tracker,
+    publisher: Publisher,
+    last: Option<RevolutionReport>,
+    counts: Counts,
+}
+
+/// What an envelope was.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Outcome {
+    /// A revolution that is to be answered.
+    Revolution(RevolutionReport),
+    /// A pose of the vehicle.
+    Pose,
+    /// Our own message, heard back.
+    Own,
+    /// Nothing that concerns us.
+    Other,
+}
+
+/// What the steps say about a revolution.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RevolutionReport {
+    /// Counts answered revolutions, from 0.
+    pub number: u32,
+    /// End of the sweep.
+    pub time: Time,
+    /// Whether time jumped, so that tracks began anew.
+    pub time_jumped: bool,
+    /// Name of the sensor.
+    pub sensor: &'static str,
+    /// How distances are written.
+    pub dialect: Dialect,
+    /// Columns in the revolution.
+    pub columns: usize,
+    /// Revolutions a second, from the step between columns.
+    pub rotation_hz: f64,
+    /// Points with a return that is used.
+    pub returns: usize,
+    /// The ground.
+    pub ground: GroundReport,
+    /// Clusters that were found.
+    pub clusters: usize,
+    /// Objects to be published.
+    pub objects: usize,
+}
+
+/// Why an envelope was of no use.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Fault {
+    /// Its bytes do not fit its message.
+    #[error("message {data_type}: {error}")]
+    Damaged {
+        /// The envelope's data type.
+        data_type: i32,
+        /// What is wrong.
+        error: WireError,
+    },
+    /// A point cloud that is no whole revolution, or that the array cannot hold.
+    #[error("point cloud refused: {0}")]
+    Refused(#[from] Refusal),
+}
+
+impl Fault {
+    /// A short name for counters and logs.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Damaged { error, .. } => error.name(),
+            Self::Refused(refusal) => refusal.name(),
+        }
+    }
+}
+
+/// What was counted since the beginning.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Point clouds handed in.
+    pub revolutions: u64,
+    /// Point clouds refused.
+    pub refused: u64,
+    /// Messages whose bytes do not fit.
+    pub damaged: u64,
+    /// Poses read.
+    pub poses: u64,
+    /// Revolutions that kept the last good plane.
+    pub ground_held: u64,
+    /// Revolutions at the configured height.
+    pub ground_fallback: u64,
+    /// Leaps in time.
+    pub time_jumps: u64,
+    /// All faults by name.
+    pub faults: Tally,
+}
+
+impl Pipeline {
+    /// A pipeline that has seen nothing; it sends as `sender_stamp`.
+    pub fn new(configuration: &Configuration, sender_stamp: u32) -> Self {
+        Self {
+            intake: Intake::default(),
+            scan: Scan::default(),
+            ground: Ground::new(&configuration.ground),
+            clusters: Dbscan::new(&configuration.cluster),
+            tracker: Tracker::new(&configuration.track),
+            publisher: Publisher::new(&configuration.publish, sender_stamp),
+            last: None,
+            counts: Counts::default(),
+            configuration: configuration.clone(),
+        }
+    }
+
+    /// Takes one envelope.
+    ///
+    /// # Errors
+    /// [`Fault`] when it is damaged or refused. It is counted, and nothing else changes: the
+    /// next good envelope is handled as if the bad one had not come.
+    pub fn handle(&mut self, envelope: &Envelope<'_>) -> Result<Outcome, Fault> {
+        let outcome = self.dispatch(envelope);
+        if let Err(fault) = &outcome {
+            self.counts.faults.count(fault.name());
+            match fault {
+                Fault::Refused(_) => self.counts.refused += 1,
+                Fault::Damaged { .. } => self.counts.damaged += 1,
+            }
+        }
+        outcome
+    }
+
+    fn dispatch(&mut self, envelope: &Envelope<'_>) -> Result<Outcome, Fault> {
+        let damaged = |error| Fault::Damaged {
+            data_type: envelope.data_type,
+            error,
+        };
+        if envelope.data_type == POINT_CLOUD_ID {
+            self.counts.revolutions += 1;
+            let cloud = CompactPointCloud::decode(envelope.payload, envelope.payload_offset)
+                .map_err(damaged)?;
+            let accepted = self
+                .intake
+                .accept(envelope, cloud, &self.configuration.cloud)?;
+            return Ok(Outcome::Revolution(self.perceive(&accepted)));
+        }
+        if OWN_IDS.contains(&envelope.data_type) {
+            return Ok(Outcome::Own);
+        }
+        if is_pose(envelope).map_err(damaged)? {
+            self.counts.poses += 1;
+            return Ok(Outcome::Pose);
+        }
+        Ok(Outcome::Other)
+    }
+
+    /// One revolution through all the steps.
+    fn perceive(&mut self, revolution: &Revolution<'_>) -> RevolutionReport {
+        if revolution.time_jumped {
+            self.ground.reset();
+            self.tracker.reset();
+        }
+        self.scan.fill(revolution, &self.configuration.cloud);
+        let ground = self.ground.process(&self.scan);
+        let clusters = self.clusters.process(&self.scan, self.ground.mask());
+        let objects = self.tracker.process(&self.scan, clusters, &ground.plane);
+
+        let report = RevolutionReport {
+            number: self.last.map_or(0, |last| last.number.wrapping_add(1)),
+            time: revolution.time,
+            time_jumped: revolution.time_jumped,
+            sensor: revolution.sensor.name,
+            dialect: revolution.dialect,
+            columns: self.scan.columns(),
+            rotation_hz: revolution.step_deg.abs() / (360.0 * revolution.sensor.column_period_s),
+            returns: self.scan.returns(),
+            ground,
+            clusters: clusters.len(),
+            objects: objects.len(),
+        };
+        self.counts.time_jumps += u64::from(report.time_jumped);
+        self.counts.ground_held += u64::from(ground.origin == Origin::Held);
+        self.counts.ground_fallback += u64::from(ground.origin == Origin::Fallback);
+        self.last = Some(report);
+        report
+    }
+
+    /// The frames that answer the last revolution, in order.
+    pub fn publish(&mut self, sent: Time, processing_s: f32) -> impl Iterator<Item = &[u8]> {
+        if let Some(last) = self.last {
+            let heading = Heading {
+                revolution: last.number,
+                time: last.time,
+                sent,
+                processing_s,
+            };
+            self.publisher.publish(&heading, self.tracker.objects());
+        }
+        self.publisher.frames()
+    }
+
+    /// The last revolution's points.
+    pub fn scan(&self) -> &Scan {
+        &self.scan
+    }
+
+    /// The last revolution's ground mask.
+    pub fn ground_mask(&self) -> &[bool] {
+        self.ground.mask()
+    }
+
+    /// The last revolution's clusters.
+    pub fn clusters(&self) -> &crate::cluster::Clusters {
+        self.clusters.clusters()
+    }
+
+    /// The last revolution's objects, by id.
+    pub fn objects(&self) -> &[Object] {
+        self.tracker.objects()
+    }
+
+    /// What was counted so far.
+    pub fn counts(&self) -> &Counts {
+        &self.counts
+    }
+
+    /// What the pipeline knows of its state. Sockets and latency are the caller's to add.
+    pub fn status(&self) -> Status {
+        let mut status = Status {
+            revolutions_received: self.counts.revolutions,
+            revolutions_published: self.last.map_or(0, |last| u64::from(last.number) + 1),
+            revolutions_refused: self.counts.refused,
+            datagrams_damaged: self.counts.damaged,
+            poses_received: self.counts.poses,
+            faults: self.counts.faults.to_string(),
+            ground_held: self.counts.ground_held,
+            ground_fallback: self.counts.ground_fallback,
+            profile: self.configuration.profile.name().into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            ..Status::default()
+        };
+        if let Some(last) = self.last {
+            status.sensor = last.sensor.into();
+            status.columns = last.columns as u32;
+            status.layers = crate::cloud::MAX_LAYERS as u32;
+            status.rotation_rate = last.rotation_hz as f32;
+            status.byte_order = last.dialect.byte_order.name().into();
+            status.byte_order_source = last.dialect.byte_order_source.name().into();
+            status.distance_unit = last.dialect.unit_m;
+            status.intensity_bits = last.dialect.intensity_bits.into();
+            status.ground_height = last.ground.plane.height_m() as f32;
+            status.ground_tilt = last.ground.plane.tilt_rad() as f32;
+        }
+        status
+    }
+}
+
+/// Whether an envelope holds a pose, which is then checked to decode.
+fn is_pose(envelope: &Envelope<'_>) -> Result<bool, WireError> {
+    fn decodes<M: Message>(envelope: &Envelope<'_>) -> Result<bool, WireError> {
+        M::decode(envelope.payload, envelope.payload_offset).map(|_| true)
+    }
+    match envelope.data_type {
+        pose::ApplanixGroup1::ID => decodes::<pose::ApplanixGroup1>(envelope),
+        pose::GeodeticWgs84Reading::ID => decodes::<pose::GeodeticWgs84Reading>(envelope),
+        pose::GeodeticHeadingReading::ID => decodes::<pose::GeodeticHeadingReading>(envelope),
+        pose::GroundSpeedReading::ID => decodes::<pose::GroundSpeedReading>(envelope),
+        pose::AngularVelocityReading::ID => decodes::<pose::AngularVelocityReading>(envelope),
+        pose::Geolocation::ID => decodes::<pose::Geolocation>(envelope),
+        pose::SimulationFrame::ID => decodes::<pose::SimulationFrame>(envelope),
+        _ => Ok(false),
+    }
+}

@@ -1,0 +1,344 @@
+//! Last step: objects become messages, and messages the frames that are sent.
+
+use crate::config::{choices, parameters};
+use crate::time::{Span, Time};
+use crate::track::Object;
+use crate::wire::environment::{Direction, Environment, PerceivedObject};
+use crate::wire::envelope::Postmark;
+use crate::wire::message::List;
+use crate::wire::object_list::ObjectList;
+use crate::wire::{Message, TimeStamp, object_list, opendlv};
+
+choices! {
+    /// Unit of angles in OpenDLV's object messages.
+    pub enum AngleUnit {
+        /// As the existing subscribers read them.
+        Degrees = "degrees",
+        /// As the message set says.
+        Radians = "radians",
+    }
+}
+
+parameters! {
+    /// What is sent for each revolution.
+    pub struct PublishParameters "publish" {
+        /// kreisel.ObjectList 2021.
+        object_list: bool = true, "";
+        /// Objects in a list. Of more, the nearest are kept, and the list says how many were
+        /// left out; 400 fill one datagram.
+        most_objects: usize = 256, in 1..=400, "objects";
+        /// OpenDLV's object messages 1128 to 1136, several for each object.
+        opendlv: bool = false, "";
+        /// Unit of ObjectDirection and ObjectAngularBlob. The message set says SI, existing
+        /// subscribers read degrees.
+        opendlv_angles: AngleUnit = AngleUnit::Degrees, "";
+        /// OpenDaVINCI's opendlv.perception.Environment 189.
+        environment: bool = false, "";
+        /// How long an Environment is valid after its revolution.
+        environment_validity_s: f64 = 0.2, in 0.0..=10.0, "s";
+    }
+}
+
+/// Makes frames and keeps them until the next revolution.
+#[derive(Debug, Clone)]
+pub struct Publisher {
+    parameters: PublishParameters,
+    sender_stamp: u32,
+    bytes: Vec<u8>,
+    ends: Vec<usize>,
+}
+
+/// What a revolution's messages say beside its objects.
+#[derive(Debug, Clone, Copy)]
+pub struct Heading {
+    /// Number of the revolution.
+    pub revolution: u32,
+    /// End of its sweep.
+    pub time: Time,
+    /// When its messages are handed to the network.
+    pub sent: Time,
+    /// From the envelope in to the list out.
+    pub processing_s: f32,
+}
+
+impl Publisher {
+    /// A publisher for an instance of the service.
+    pub fn new(parameters: &PublishParameters, sender_stamp: u32) -> Self {
+        Self {
+            parameters: parameters.clone(),
+            sender_stamp,
+            bytes: vec![],
+            ends: vec![],
+        }
+    }
+
+    /// The frames of the last revolution in the order in which they are to be sent.
+    pub fn frames(&self) -> impl Iterator<Item = &[u8]> {
+        let starts = std::iter::once(0).chain(self.ends.iter().copied());
+        starts
+            .zip(&self.ends)
+            .map(|(start, end)| &self.bytes[start..*end])
+    }
+
+    /// Makes the frames of a revolution.
+    pub fn publish(&mut self, heading: &Heading, objects: &[Object]) {
+        self.bytes.clear();
+        self.ends.clear();
+        let (kept, omitted) = nearest(objects, self.parameters.most_objects);
+        let postmark = Postmark {
+            sent: heading.sent,
+            sampled: heading.time,
+            sender_stamp: self.sender_stamp,
+        };
+        if self.parameters.object_list {
+            self.put(&postmark, &object_list_of(heading, &kept, omitted));
+        }
+        if self.parameters.opendlv {
+            self.put_opendlv(&postmark, heading, &kept);
+        }
+        if self.parameters.environment {
+            let validity = Span::from_seconds(self.parameters.environment_validity_s);
+            self.put(&postmark, &environment_of(heading.time + validity, &kept));
+        }
+    }
+
+    fn put<M: Message>(&mut self, postmark: &Postmark, message: &M) {
+        postmark.put(&mut self.bytes, message);
+        self.ends.push(self.bytes.len());
+    }
+
+    fn put_opendlv(&mut self, postmark: &Postmark, heading: &Heading, objects: &[&Object]) {
+        let object_frame_id = heading.revolution;
+        self.put(postmark, &opendlv::ObjectFrameStart { object_frame_id });
+        let unit = match self.parameters.opendlv_angles {
+            AngleUnit::Degrees => 1f64.to_degrees(),
+            AngleUnit::Radians => 1.0,
+        };
+        for object in objects {
+            let (object_id, sight) = (object.id, Sight::of(object));
+            let [x, y, z] = object.centre_m.map(|metres| metres as f32);
+            self.put(postmark, &opendlv::ObjectAnnouncement { object_id });
+            self.put(postmark, &opendlv::ObjectType { object_id, kind: UNCLASSIFIED });
+            self.put(
+                postmark,
+                &opendlv::ObjectDirection {
+                    object_id,
+                    azimuth_angle: (sight.azimuth_rad * unit) as f32,
+                    zenith_angle: (sight.zenith_rad * unit) as f32,
+                },
+            );
+            let distance = sight.distance_m as f32;
+            self.put(postmark, &opendlv::ObjectDistance { object_id, distance });
+            self.put(
+                postmark,
+                &opendlv::ObjectAngularBlob {
+                    object_id,
+                    width: (sight.width_rad * unit) as f32,
+                    height: (sight.height_rad * unit) as f32,
+                },
+            );
+            self.put(postmark, &opendlv::ObjectPosition { object_id, x, y, z });
+        }
+        self.put(postmark, &opendlv::ObjectFrameEnd { object_frame_id });
+    }
+}
+
+/// The class of an object that nobody has classified.
+const UNCLASSIFIED: u32 = 0;
+
+/// The objects that a list has room for, in their order, and how many it has none for.
+fn nearest(objects: &[Object], most: usize) -> (Vec<&Object>, usize) {
+    let mut kept: Vec<&Object> = objects.iter().collect();
+    if kept.len() > most {
+        let distance = |object: &Object| Sight::of(object).distance_m;
+        kept.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        kept.truncate(most);
+        kept.sort_by_key(|object| object.id);
+    }
+    let omitted = objects.len() - kept.len();
+    (kept, omitted)
+}
+
+fn object_list_of(heading: &Heading, objects: &[&Object], omitted: usize) -> ObjectList {
+    let message = |object: &&Object| object_list::Object {
+        object_id: object.id,
+        classification: UNCLASSIFIED,
+        class_probability: 0.0,
+        existence: object.existence as f32,
+        measured: true,
+        x: object.centre_m[0],
+        y: object.centre_m[1],
+        z: object.centre_m[2],
+        yaw: object.yaw_rad as f32,
+        speed: object.speed_mps as f32,
+        yaw_rate: 0.0,
+        acceleration: 0.0,
+        length: object.length_m as f32,
+        width: object.width_m as f32,
+        height: object.height_m as f32,
+        x_deviation: object.position_deviation_m as f32,
+        y_deviation: object.position_deviation_m as f32,
+        yaw_deviation: object.yaw_deviation_rad as f32,
+        speed_deviation: object.speed_deviation_mps as f32,
+        age: (heading.time - object.first_seen).seconds() as f32,
+        time_since_measurement: 0.0,
+        number_of_points: object.points as u32,
+    };
+    ObjectList {
+        revolution: heading.revolution,
+        frame: 0,
+        ego_known: false,
+        ego_x: 0.0,
+        ego_y: 0.0,
+        ego_z: 0.0,
+        ego_yaw: 0.0,
+        count: objects.len() as u32,
+        omitted: omitted as u32,
+        processing_time: heading.processing_s,
+        objects: List(objects.iter().map(message).collect()),
+    }
+}
+
+fn environment_of(valid_until: Time, objects: &[&Object]) -> Environment {
+    let message = |object: &&Object| {
+        let sight = Sight::of(object);
+        PerceivedObject {
+            identified: TimeStamp::from(object.first_seen),
+            kind: "unclassified".into(),
+            direction: Direction {
+                azimuth: sight.azimuth_rad as f32,
+                zenith: sight.zenith_rad as f32,
+            },
+            direction_confidence: object.existence as f32,
+            distance: sight.distance_m as f32,
+            distance_confidence: object.existence as f32,
+            angular_size: sight.width_rad as f32,
+            angular_size_confidence: object.existence as f32,
+            confidence: object.existence as f32,
+            sources: List(vec!["lidar".into()]),
+            object_id: object.id as i16,
+            ..PerceivedObject::default()
+        }
+    };
+    Environment {
+        valid_until: TimeStamp::from(valid_until),
+        objects: List(objects.iter().map(message).collect()),
+    }
+}
+
+/// An object as seen from the sensor, which looks along y.
+struct Sight {
+    azimuth_rad: f64,
+    zenith_rad: f64,
+    distance_m: f64,
+    width_rad: f64,
+    height_rad: f64,
+}
+
+impl Sight {
+    fn of(object: &Object) -> Self {
+        let [x, y, z] = object.centre_m;
+        let horizontal_m = libm::hypot(x, y);
+        let distance_m = libm::hypot(horizontal_m, z);
+        // How wide the box appears: its shadow across the line of sight.
+        let turn_rad = object.yaw_rad - libm::atan2(y, x);
+        let across_m = object.length_m * libm::fabs(libm::sin(turn_rad))
+            + object.width_m * libm::fabs(libm::cos(turn_rad));
+        let seen_under = |size_m: f64| 2.0 * libm::atan2(0.5 * size_m, distance_m.max(0.1));
+        Self {
+            azimuth_rad: libm::atan2(-x, y),
+            zenith_rad: libm::atan2(z, horizontal_m),
+            distance_m,
+            width_rad: seen_under(across_m),
+            height_rad: seen_under(object.height_m),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Profile;
+    use crate::wire::Envelope;
+    use crate::wire::frame::MAX_DATAGRAM_LEN;
+
+    fn object(id: u32, x: f64, y: f64) -> Object {
+        Object {
+            id,
+            centre_m: [x, y, -1.0],
+            yaw_rad: 1.0,
+            speed_mps: 3.0,
+            length_m: 4.0,
+            width_m: 2.0,
+            height_m: 1.5,
+            position_deviation_m: 0.1,
+            yaw_deviation_rad: 0.1,
+            speed_deviation_mps: 0.1,
+            existence: 0.5,
+            first_seen: Time::from_micros(1),
+            points: 70_000,
+        }
+    }
+
+    fn heading() -> Heading {
+        Heading {
+            revolution: 7,
+            time: Time::from_micros(1_700_000_000_000_000),
+            sent: Time::from_micros(1_700_000_000_010_000),
+            processing_s: 0.002,
+        }
+    }
+
+    fn publish(edit: impl Fn(&mut PublishParameters), objects: &[Object]) -> Publisher {
+        let mut parameters = PublishParameters::profile(Profile::Default);
+        edit(&mut parameters);
+        let mut publisher = Publisher::new(&parameters, 42);
+        publisher.publish(&heading(), objects);
+        publisher
+    }
+
+    fn ids(publisher: &Publisher) -> Vec<i32> {
+        let data_type = |frame| Envelope::from_datagram(frame).unwrap().0.data_type;
+        publisher.frames().map(data_type).collect()
+    }
+
+    #[test]
+    fn an_empty_revolution_is_an_empty_list() {
+        let publisher = publish(|_| {}, &[]);
+        let frames: Vec<_> = publisher.frames().collect();
+        let (envelope, _) = Envelope::from_datagram(frames[0]).unwrap();
+        let list = ObjectList::decode(envelope.payload, 0).unwrap();
+        assert_eq!((frames.len(), list.count, list.revolution), (1, 0, 7));
+        assert_eq!((envelope.sender_stamp, envelope.time()), (42, heading().time));
+    }
+
+    #[test]
+    fn opendlv_messages_stand_between_frame_start_and_end() {
+        let all = |parameters: &mut PublishParameters| {
+            (parameters.opendlv, parameters.environment) = (true, true);
+        };
+        let objects = [object(1, 1.0, 2.0), object(2, 3.0, 4.0)];
+        let each = [1130, 1131, 1133, 1134, 1135, 1136];
+        let expected = [&[2021, 1128][..], &each, &each, &[1129, 189]].concat();
+        assert_eq!(ids(&publish(all, &objects)), expected);
+    }
+
+    #[test]
+    fn an_object_to_the_left_has_a_positive_azimuth() {
+        let sight = Sight::of(&object(1, -5.0, 5.0));
+        assert!((sight.azimuth_rad.to_degrees() - 45.0).abs() < 1e-9);
+        assert!(sight.zenith_rad < 0.0);
+    }
+
+    #[test]
+    fn the_longest_list_fits_a_datagram_and_says_what_it_left_out() {
+        let objects: Vec<_> = (0..1000).map(|id| object(u32::MAX - 1000 + id, f64::from(id), 1.0)).collect();
+        let publisher = publish(|parameters| parameters.most_objects = 400, &objects);
+        let frame = publisher.frames().next().unwrap();
+        let (envelope, _) = Envelope::from_datagram(frame).unwrap();
+        let list = ObjectList::decode(envelope.payload, 0).unwrap();
+        assert!(frame.len() <= MAX_DATAGRAM_LEN, "{}", frame.len());
+        assert_eq!((list.count, list.omitted), (400, 600));
+        assert_eq!(list.objects.0[399].x, 399.0);
+    }
+}

@@ -1,0 +1,204 @@
+//! Boxes around what a sensor sees of an object: one or two of its sides.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// A rectangle in the plane, seen from a sensor at the origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rectangle {
+    /// Its middle.
+    pub centre_m: [f64; 2],
+    /// Direction of its length, in (-pi, pi].
+    pub yaw_rad: f64,
+    /// Along the yaw.
+    pub length_m: f64,
+    /// Across the yaw.
+    pub width_m: f64,
+}
+
+/// Directions that are tried within a quarter turn.
+const DIRECTIONS: usize = 30;
+/// Points that are looked at for the direction: more do not change it.
+const MOST_POINTS: usize = 256;
+/// Distance to an edge below which a point counts as on it.
+const NEAREST_M: f64 = 0.05;
+
+impl Rectangle {
+    /// The rectangle around points with its length along `heading_rad`, or, without one, in
+    /// the direction in which the points lie closest to its edges (L-shape fit by closeness;
+    /// Zhang, Xu, Dong, Dolan 2017, algorithm 4), its length being the longer side.
+    pub fn fit(points_m: &[[f64; 2]], heading_rad: Option<f64>) -> Self {
+        if let Some(heading_rad) = heading_rad {
+            return Self::along(points_m, heading_rad);
+        }
+        let stride = points_m.len().div_ceil(MOST_POINTS).max(1);
+        let mut best = (f64::MIN, 0.0);
+        for step in 0..DIRECTIONS {
+            let yaw_rad = FRAC_PI_2 * step as f64 / DIRECTIONS as f64;
+            let closeness = closeness(points_m, stride, yaw_rad);
+            if closeness > best.0 {
+                best = (closeness, yaw_rad);
+            }
+        }
+        let rectangle = Self::along(points_m, best.1);
+        if rectangle.length_m >= rectangle.width_m {
+            rectangle
+        } else {
+            rectangle.quarter_turned()
+        }
+    }
+
+    fn along(points_m: &[[f64; 2]], yaw_rad: f64) -> Self {
+        let (sine, cosine) = libm::sincos(yaw_rad);
+        let extent = Extent::of(points_m.iter(), sine, cosine);
+        let [u, v] = extent.middle();
+        Self {
+            centre_m: [u * cosine - v * sine, u * sine + v * cosine],
+            yaw_rad,
+            length_m: extent.high[0] - extent.low[0],
+            width_m: extent.high[1] - extent.low[1],
+        }
+    }
+
+    /// The same rectangle with length and width exchanged.
+    pub fn quarter_turned(self) -> Self {
+        let yaw_rad = self.yaw_rad + FRAC_PI_2;
+        Self {
+            yaw_rad: if yaw_rad > PI { yaw_rad - 2.0 * PI } else { yaw_rad },
+            length_m: self.width_m,
+            width_m: self.length_m,
+            ..self
+        }
+    }
+
+    /// At least so long and so wide, grown away from the sensor: the edges that it sees stay.
+    pub fn grown(self, length_m: f64, width_m: f64) -> Self {
+        let (sine, cosine) = libm::sincos(self.yaw_rad);
+        let [x, y] = self.centre_m;
+        let (along_m, across_m) = (x * cosine + y * sine, y * cosine - x * sine);
+        let grow = |size_m: f64, wanted_m: f64, offset_m: f64| {
+            let added_m = (wanted_m - size_m).max(0.0);
+            // Seen end on, an edge that is cut by the line of sight grows to both sides.
+            let side = (offset_m / (0.5 * size_m).max(NEAREST_M)).clamp(-1.0, 1.0);
+            (size_m + added_m, 0.5 * added_m * side)
+        };
+        let (length_m, du) = grow(self.length_m, length_m, along_m);
+        let (width_m, dv) = grow(self.width_m, width_m, across_m);
+        Self {
+            centre_m: [x + du * cosine - dv * sine, y + du * sine + dv * cosine],
+            length_m,
+            width_m,
+            ..self
+        }
+    }
+
+    /// Standard deviation of the yaw: known from motion, fair where two sides differ much,
+    /// else anything (uniform over a half turn).
+    pub(super) fn yaw_deviation_rad(&self, moving: bool) -> f64 {
+        const FROM_MOTION_RAD: f64 = 0.15;
+        const FROM_SHAPE_RAD: f64 = 0.3;
+        const UNKNOWN_RAD: f64 = 0.9;
+        if moving {
+            FROM_MOTION_RAD
+        } else if self.length_m > 1.5 * self.width_m {
+            FROM_SHAPE_RAD
+        } else {
+            UNKNOWN_RAD
+        }
+    }
+}
+
+/// How close points lie to the edges of their rectangle: the sum of 1/distance.
+fn closeness(points_m: &[[f64; 2]], stride: usize, yaw_rad: f64) -> f64 {
+    let (sine, cosine) = libm::sincos(yaw_rad);
+    let points = || points_m.iter().step_by(stride);
+    let extent = Extent::of(points(), sine, cosine);
+    points()
+        .map(|point| {
+            let position = turned(point, sine, cosine);
+            let to_edge = |axis: usize| {
+                let (low, high) = (extent.low[axis], extent.high[axis]);
+                (position[axis] - low).min(high - position[axis])
+            };
+            1.0 / to_edge(0).min(to_edge(1)).max(NEAREST_M)
+        })
+        .sum()
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Extent {
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+impl Extent {
+    fn of<'a>(points_m: impl Iterator<Item = &'a [f64; 2]>, sine: f64, cosine: f64) -> Self {
+        let nothing = Self {
+            low: [f64::MAX; 2],
+            high: [f64::MIN; 2],
+        };
+        points_m.fold(nothing, |extent, point| {
+            let [u, v] = turned(point, sine, cosine);
+            Self {
+                low: [extent.low[0].min(u), extent.low[1].min(v)],
+                high: [extent.high[0].max(u), extent.high[1].max(v)],
+            }
+        })
+    }
+
+    fn middle(&self) -> [f64; 2] {
+        [0, 1].map(|axis| 0.5 * (self.low[axis] + self.high[axis]))
+    }
+}
+
+/// A point's coordinates along and across a direction.
+fn turned([x, y]: &[f64; 2], sine: f64, cosine: f64) -> [f64; 2] {
+    [x * cosine + y * sine, y * cosine - x * sine]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The two sides of a car that a sensor at the origin sees.
+    fn corner(yaw_rad: f64) -> Vec<[f64; 2]> {
+        let (sine, cosine) = yaw_rad.sin_cos();
+        let side = (0..40).map(|n| [f64::from(n) * 0.1, 0.0]);
+        let rear = (0..17).map(|n| [0.0, f64::from(n) * 0.1]);
+        side.chain(rear)
+            .map(|[u, v]| [8.0 + u * cosine - v * sine, 3.0 + u * sine + v * cosine])
+            .collect()
+    }
+
+    #[test]
+    fn the_direction_of_an_l_shape_is_found() {
+        for degrees in [0.0f64, 15.0, 40.0, 75.0] {
+            let rectangle = Rectangle::fit(&corner(degrees.to_radians()), None);
+            let error = rectangle.yaw_rad.to_degrees() - degrees;
+            assert!(error.abs() < 2.0, "{degrees} {rectangle:?}");
+            assert!((rectangle.length_m - 3.9).abs() < 0.2);
+            assert!((rectangle.width_m - 1.6).abs() < 0.2);
+        }
+    }
+
+    #[test]
+    fn growing_keeps_the_near_edges() {
+        let seen = Rectangle {
+            centre_m: [10.0, 0.0],
+            yaw_rad: 0.0,
+            length_m: 0.2,
+            width_m: 1.8,
+        };
+        let grown = seen.grown(4.2, 1.8);
+        assert_eq!((grown.length_m, grown.width_m), (4.2, 1.8));
+        assert!((grown.centre_m[0] - 12.0).abs() < 1e-9);
+        assert!(grown.centre_m[1].abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_quarter_turn_exchanges_the_sides() {
+        let rectangle = Rectangle::fit(&corner(0.0), None);
+        let turned = rectangle.quarter_turned();
+        assert_eq!(turned.length_m, rectangle.width_m);
+        assert!((turned.yaw_rad - FRAC_PI_2).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,100 @@
+//! Step one and last: bytes to messages and messages to bytes.
+//!
+//! A datagram holds one frame (`frame`), a frame one envelope (`envelope`), an envelope the
+//! bytes of one message (`message` and the modules after it). A recording (`recording`) is
+//! frames end to end. Degrees, centimetres, zigzag and big-endian end in this folder.
+
+pub mod protobuf;
+
+pub mod frame;
+
+pub mod envelope;
+
+pub mod recording;
+
+pub mod message;
+
+pub mod point_cloud;
+
+pub mod pose;
+
+pub mod object_list;
+
+pub mod status;
+
+pub mod opendlv;
+
+pub mod environment;
+
+pub use envelope::{Envelope, TimeStamp};
+pub(crate) use message::message;
+pub use message::{FieldDescription, Message};
+pub use recording::Recording;
+
+/// What can be wrong with bytes from the network or a file. Offsets count from the first
+/// byte of the datagram or file.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum WireError {
+    /// A frame does not begin with `0D A4`.
+    #[error("byte {offset}: no frame begins here (expected 0d a4)")]
+    BadMagic {
+        /// Where the frame should begin.
+        offset: usize,
+    },
+    /// The frame's length field points past the end of the datagram or file.
+    #[error("byte {offset}: the frame announces {announced} bytes, {available} are there")]
+    FrameTruncated {
+        /// Where the frame begins.
+        offset: usize,
+        /// Bytes that its header announces.
+        announced: usize,
+        /// Bytes that follow the header.
+        available: usize,
+    },
+    /// The bytes end inside a number.
+    #[error("byte {offset}: the message ends inside a number")]
+    Truncated {
+        /// Where the number begins.
+        offset: usize,
+    },
+    /// A varint has more than ten bytes.
+    #[error("byte {offset}: a varint of more than ten bytes")]
+    VarintTooLong {
+        /// Where the varint begins.
+        offset: usize,
+    },
+    /// A field's length points past the end of its message.
+    #[error("byte {offset}: a field announces {length} bytes, {available} are there")]
+    LengthBeyondEnd {
+        /// Where the length stands.
+        offset: usize,
+        /// The announced length.
+        length: u64,
+        /// What the message still holds.
+        available: usize,
+    },
+}
+
+impl WireError {
+    /// A short name for counters and logs.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::BadMagic { .. } => "bad_magic",
+            Self::FrameTruncated { .. } => "frame_truncated",
+            Self::Truncated { .. } => "number_truncated",
+            Self::VarintTooLong { .. } => "varint_too_long",
+            Self::LengthBeyondEnd { .. } => "length_beyond_end",
+        }
+    }
+
+    /// The offset of the first byte that is wrong.
+    pub const fn offset(&self) -> usize {
+        match self {
+            Self::BadMagic { offset }
+            | Self::FrameTruncated { offset, .. }
+            | Self::Truncated { offset }
+            | Self::VarintTooLong { offset }
+            | Self::LengthBeyondEnd { offset, .. } => *offset,
+        }
+    }
+}

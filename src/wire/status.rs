@@ -1,0 +1,67 @@
+//! How the service is doing: `kreisel.Status`, once a second.
+
+super::message! {
+    /// Counters since start, settings that were found from the data, and latency.
+    pub struct Status = 2023 "kreisel.Status" {
+        /// Seconds since start.
+        1 => uptime: f64,
+        /// Point clouds that came in whole.
+        2 => revolutions_received: u64,
+        /// Object lists sent.
+        3 => revolutions_published: u64,
+        /// Point clouds refused; `faults` says why.
+        4 => revolutions_refused: u64,
+        /// Point clouds dropped because the pipeline was behind.
+        5 => revolutions_queue_dropped: u64,
+        /// Datagrams of the session.
+        6 => datagrams_received: u64,
+        /// Datagrams that the kernel dropped for want of buffer.
+        7 => datagrams_kernel_dropped: u64,
+        /// Datagrams that were no sound envelope; `faults` says why.
+        8 => datagrams_damaged: u64,
+        /// Our own datagrams, heard back and ignored.
+        9 => datagrams_own: u64,
+        /// Pose messages read.
+        10 => poses_received: u64,
+        /// Every fault with its count, as `name=count` with spaces between.
+        11 => faults: String,
+        /// Arrival of a point cloud to its list sent, median, seconds.
+        12 => latency_median: f32,
+        /// The same, 99th percentile.
+        13 => latency_p99: f32,
+        /// The same, greatest.
+        14 => latency_max: f32,
+        /// Sensor that was found.
+        15 => sensor: String,
+        /// Columns of the last revolution.
+        16 => columns: u32,
+        /// Layers of the last revolution.
+        17 => layers: u32,
+        /// Revolutions a second, from the step between columns.
+        18 => rotation_rate: f32,
+        /// Byte order of the distances.
+        19 => byte_order: String,
+        /// How the byte order is known: configured, detected or assumed.
+        20 => byte_order_source: String,
+        /// Metres per unit of distance.
+        21 => distance_unit: f32,
+        /// Bits of each distance that hold the intensity.
+        22 => intensity_bits: u32,
+        /// Height of the sensor above the ground plane, metres.
+        23 => ground_height: f32,
+        /// Tilt of the ground plane against the sensor, radians.
+        24 => ground_tilt: f32,
+        /// Revolutions that kept the last good plane.
+        25 => ground_held: u64,
+        /// Revolutions that fell back to the configured height.
+        26 => ground_fallback: u64,
+        /// Receive buffer that the kernel granted, bytes.
+        27 => receive_buffer: u32,
+        /// Whether revolutions come in and none was dropped lately.
+        28 => healthy: bool,
+        /// Profile that the configuration began from.
+        29 => profile: String,
+        /// Version of the program.
+        30 => version: String,
+    }
+}
