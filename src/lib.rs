@@ -49,3 +49,11 @@ pub mod random;
 
 // A synthetic session with truth.
 pub mod simulate;
+
+// Sockets, threads, signals: the shell around the pipeline.
+#[cfg(feature = "shell")]
+pub mod daemon;
+
+// One file a command.
+#[cfg(feature = "shell")]
+pub mod cli;

@@ -15,6 +15,17 @@ use crate::wire::{Envelope, Message, WireError, pose};
 /// Message numbers that are ours: what we send, heard back.
 const OWN_IDS: std::ops::RangeInclusive<i32> = 2020..=2039;
 
+/// Message numbers of poses.
+const POSE_IDS: [i32; 7] = [
+    pose::ApplanixGroup1::ID,
+    pose::GeodeticWgs84Reading::ID,
+    pose::GeodeticHeadingReading::ID,
+    pose::GroundSpeedReading::ID,
+    pose::AngularVelocityReading::ID,
+    pose::Geolocation::ID,
+    pose::SimulationFrame::ID,
+];
+
 /// The whole of perception: an envelope in, envelopes out.
 ///
 /// [`Pipeline::handle`] takes every envelope of the session in the order in which they come.
@@ -134,6 +145,11 @@ impl Pipeline {
             counts: Counts::default(),
             configuration: configuration.clone(),
         }
+    }
+
+    /// Whether messages of this number are of any interest.
+    pub fn concerns(data_type: i32) -> bool {
+        data_type == POINT_CLOUD_ID || POSE_IDS.contains(&data_type)
     }
 
     /// Takes one envelope.

@@ -96,7 +96,7 @@ impl DialectDetector {
 }
 
 /// The byte order that the data of one message shows, if it shows any.
-pub(super) fn shown_order(cloud: &CompactPointCloud<'_>) -> Option<ByteOrder> {
+pub fn shown_order(cloud: &CompactPointCloud<'_>) -> Option<ByteOrder> {
     let big = cloud.roughness(ByteOrder::Big) as f64;
     let little = cloud.roughness(ByteOrder::Little) as f64;
     if little > CLEAR_RATIO * big {
@@ -116,7 +116,7 @@ fn unit_m(cloud: &CompactPointCloud<'_>, setting: UnitSetting) -> Option<f32> {
         (UnitSetting::Centimetre, _) => Some(CENTIMETRE_M),
         (UnitSetting::TwoMillimetres, _) => Some(TWO_MILLIMETRES_M),
         (UnitSetting::TwoCentimetres, _) => Some(TWO_CENTIMETRES_M),
-        (UnitSetting::Auto, Schema::OpenDlv { .. }) => Some(CENTIMETRE_M),
+        (UnitSetting::Auto, Schema::Bare | Schema::OpenDlv { .. }) => Some(CENTIMETRE_M),
         (UnitSetting::Auto, Schema::OpenDaVinci { encoding, .. }) => match encoding {
             DistanceEncoding::Centimetre => Some(CENTIMETRE_M),
             DistanceEncoding::TwoMillimetres => Some(TWO_MILLIMETRES_M),

@@ -15,7 +15,7 @@ pub(crate) use scan::tests;
 
 pub mod sensor;
 
-pub use dialect::{ByteOrderSource, Dialect};
+pub use dialect::{ByteOrderSource, Dialect, shown_order};
 pub use intake::{Intake, Refusal, Revolution};
 pub use scan::{CAPACITY, MASKED, MAX_COLUMNS, MAX_LAYERS, Scan};
 

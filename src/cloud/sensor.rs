@@ -77,7 +77,7 @@ pub fn identify(cloud: &CompactPointCloud<'_>) -> Option<&'static Sensor> {
         Schema::OpenDlv {
             vertical_layout, ..
         } => vertical_layout,
-        Schema::OpenDaVinci { .. } => 0,
+        Schema::Bare | Schema::OpenDaVinci { .. } => 0,
     };
     let parts = match layout {
         LAYOUT_RPLIDAR => return None,

@@ -16,6 +16,8 @@ pub mod message;
 
 pub mod point_cloud;
 
+pub mod vlp16_packet;
+
 pub mod pose;
 
 pub mod object_list;
@@ -30,6 +32,43 @@ pub use envelope::{Envelope, TimeStamp};
 pub(crate) use message::message;
 pub use message::{FieldDescription, Message};
 pub use recording::Recording;
+
+/// The full name of a message that this crate reads or writes.
+pub fn known_name(data_type: i32) -> Option<&'static str> {
+    macro_rules! names {
+        ($($message:ty),* $(,)?) => {
+            match data_type {
+                point_cloud::POINT_CLOUD_ID => Some("opendlv.proxy.PointCloudReading"),
+                $( <$message>::ID => Some(<$message>::NAME), )*
+                _ => None,
+            }
+        };
+    }
+    names!(
+        TimeStamp,
+        pose::ApplanixGroup1,
+        pose::GeodeticWgs84Reading,
+        pose::GeodeticHeadingReading,
+        pose::GroundSpeedReading,
+        pose::AngularVelocityReading,
+        pose::Geolocation,
+        pose::SimulationFrame,
+        object_list::Object,
+        object_list::ObjectList,
+        status::Status,
+        opendlv::ObjectFrameStart,
+        opendlv::ObjectFrameEnd,
+        opendlv::ObjectAnnouncement,
+        opendlv::ObjectType,
+        opendlv::ObjectDirection,
+        opendlv::ObjectDistance,
+        opendlv::ObjectAngularBlob,
+        opendlv::ObjectPosition,
+        environment::Direction,
+        environment::PerceivedObject,
+        environment::Environment,
+    )
+}
 
 /// What can be wrong with bytes from the network or a file. Offsets count from the first
 /// byte of the datagram or file.

@@ -32,6 +32,9 @@ pub struct CompactPointCloud<'a> {
 /// Fields 6 and 7 in the meaning of the schema that the sender uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Schema<'a> {
+    /// Neither field: OpenDLV up to v0.9.1, whose VLP-16 service is the most common sender,
+    /// and OpenDaVINCI before 4.6.0.
+    Bare,
     /// OpenDaVINCI since 4.6.0.
     OpenDaVinci {
         /// Field 6.
@@ -39,7 +42,7 @@ pub enum Schema<'a> {
         /// Field 7.
         encoding: DistanceEncoding,
     },
-    /// OpenDLV, and OpenDaVINCI before 4.6.0, which had neither field.
+    /// OpenDLV since v0.9.7.
     OpenDlv {
         /// Field 6: 0 HDL-32E (and default), 1 VLP-32C, 2 RPLidar.
         vertical_layout: u8,
@@ -84,12 +87,30 @@ pub const LAYOUT_RPLIDAR: u8 = 2;
 /// The vertical layout code of a VLP-32C.
 pub const LAYOUT_VLP32C: u8 = 1;
 
+impl Schema<'_> {
+    /// Field 6 in the meaning that field 7 has decided.
+    fn with_field_6(self, raw: Option<u64>) -> Self {
+        match (self, raw) {
+            (Self::OpenDaVinci { encoding, .. }, _) => Self::OpenDaVinci {
+                placement: IntensityPlacement::from_code(unzigzag(raw.unwrap_or(0)) as i32),
+                encoding,
+            },
+            (Self::OpenDlv { azimuth_angles, .. }, _) => Self::OpenDlv {
+                vertical_layout: raw.unwrap_or(0) as u8,
+                azimuth_angles,
+            },
+            (Self::Bare, Some(raw)) => Self::OpenDlv {
+                vertical_layout: raw as u8,
+                azimuth_angles: &[],
+            },
+            (Self::Bare, None) => Self::Bare,
+        }
+    }
+}
+
 impl Default for Schema<'_> {
     fn default() -> Self {
-        Self::OpenDlv {
-            vertical_layout: 0,
-            azimuth_angles: &[],
-        }
+        Self::Bare
     }
 }
 
@@ -127,7 +148,7 @@ impl<'a> CompactPointCloud<'a> {
     pub fn decode(payload: &'a [u8], base: usize) -> Result<Self, WireError> {
         let mut cloud = Self::default();
         let mut layers = 0u64;
-        let mut field_6 = 0u64;
+        let mut field_6 = None;
         let mut reader = Reader::new(payload, base);
         while let Some(field) = reader.next_field()? {
             let end = reader.offset();
@@ -137,7 +158,7 @@ impl<'a> CompactPointCloud<'a> {
                 (3, Value::Varint(raw)) => layers = raw,
                 (4, Value::Bytes(bytes)) => cloud.distances = bytes,
                 (5, value) => cloud.intensity_bits.merge(value, end)?,
-                (6, Value::Varint(raw)) => field_6 = raw,
+                (6, Value::Varint(raw)) => field_6 = Some(raw),
                 (7, Value::Varint(raw)) => {
                     cloud.schema = Schema::OpenDaVinci {
                         placement: IntensityPlacement::Unknown(0),
@@ -154,14 +175,7 @@ impl<'a> CompactPointCloud<'a> {
             }
         }
         cloud.layers = u8::try_from(layers).unwrap_or(u8::MAX);
-        match &mut cloud.schema {
-            Schema::OpenDaVinci { placement, .. } => {
-                *placement = IntensityPlacement::from_code(unzigzag(field_6) as i32);
-            }
-            Schema::OpenDlv {
-                vertical_layout, ..
-            } => *vertical_layout = field_6 as u8,
-        }
+        cloud.schema = cloud.schema.with_field_6(field_6);
         Ok(cloud)
     }
 
@@ -173,6 +187,7 @@ impl<'a> CompactPointCloud<'a> {
         put_bytes(out, 4, self.distances);
         self.intensity_bits.put(out, 5);
         match self.schema {
+            Schema::Bare => {}
             Schema::OpenDaVinci {
                 placement,
                 encoding,
@@ -220,24 +235,53 @@ impl<'a> CompactPointCloud<'a> {
     /// both have a return. Surfaces are smooth, so the wrong order is 20 to 150 times rougher
     /// on real clouds.
     pub fn roughness(&self, order: ByteOrder) -> u64 {
-        const PAIR_STRIDE: usize = 8;
-        let mask = self.distance_mask();
-        let column_len = 2 * usize::from(self.layers);
-        if column_len == 0 {
-            return 0;
+        self.inner_difference(order).0
+    }
+
+    /// How much rougher the step from the last column to the first is than a step between
+    /// neighbours. About 1 where the message is a whole turn, large where it is a piece of
+    /// one; `None` where too few layers return at both ends.
+    pub fn seam_roughness(&self, order: ByteOrder) -> Option<f64> {
+        const LEAST_PAIRS: u64 = 4;
+        let mut columns = self.column_bytes()?;
+        let (first, last) = (columns.next()?, columns.next_back()?);
+        let (seam, seam_pairs) = self.difference(last, first, order);
+        let (inner, inner_pairs) = self.inner_difference(order);
+        if seam_pairs < LEAST_PAIRS || inner_pairs < LEAST_PAIRS {
+            return None;
         }
+        // A cloud of constant distances has no steps at all.
+        let mean = |sum: u64, pairs: u64| (sum as f64 / pairs as f64).max(1.0);
+        Some(mean(seam, seam_pairs) / mean(inner, inner_pairs))
+    }
+
+    fn column_bytes(&self) -> Option<std::slice::ChunksExact<'a, u8>> {
+        let length = 2 * usize::from(self.layers);
+        (length > 0).then(|| self.distances.chunks_exact(length))
+    }
+
+    /// Sum and number of differences over every eighth pair of neighbouring columns.
+    fn inner_difference(&self, order: ByteOrder) -> (u64, u64) {
+        const PAIR_STRIDE: usize = 8;
+        let (Some(left), Some(right)) = (self.column_bytes(), self.column_bytes()) else {
+            return (0, 0);
+        };
+        left.zip(right.skip(1))
+            .step_by(PAIR_STRIDE)
+            .map(|(left, right)| self.difference(left, right, order))
+            .fold((0, 0), |total, pair| (total.0 + pair.0, total.1 + pair.1))
+    }
+
+    /// Sum and number of differences between two columns, where both return.
+    fn difference(&self, left: &[u8], right: &[u8], order: ByteOrder) -> (u64, u64) {
+        let mask = self.distance_mask();
         let distance = |bytes: &[u8]| order.join([bytes[0], bytes[1]]) & mask;
-        let pairs = self
-            .distances
-            .chunks_exact(column_len)
-            .zip(self.distances.chunks_exact(column_len).skip(1))
-            .step_by(PAIR_STRIDE);
-        pairs
-            .flat_map(|(left, right)| left.chunks_exact(2).zip(right.chunks_exact(2)))
+        left.chunks_exact(2)
+            .zip(right.chunks_exact(2))
             .map(|(left, right)| (distance(left), distance(right)))
             .filter(|(left, right)| *left != 0 && *right != 0)
             .map(|(left, right)| u64::from(left.abs_diff(right)))
-            .sum()
+            .fold((0, 0), |(sum, pairs), difference| (sum + difference, pairs + 1))
     }
 }
 
@@ -312,7 +356,7 @@ mod tests {
             },
             ..cloud(&[1, 2])
         };
-        for sent in [lower, vlp32c] {
+        for sent in [lower, vlp32c, cloud(&[1, 2])] {
             let mut out = vec![];
             sent.encode(&mut out);
             assert_eq!(CompactPointCloud::decode(&out, 0), Ok(sent));
@@ -342,6 +386,18 @@ mod tests {
             .collect();
         let message = cloud(&distances);
         assert!(message.roughness(ByteOrder::Little) > 10 * message.roughness(ByteOrder::Big));
+    }
+
+    #[test]
+    fn a_piece_of_a_turn_is_rough_at_its_seam() {
+        let turn: Vec<u8> = (0..360u16)
+            .flat_map(|column| std::iter::repeat_n(1000 + column.abs_diff(180), 16))
+            .flat_map(u16::to_be_bytes)
+            .collect();
+        let seam = |distances| cloud(distances).seam_roughness(ByteOrder::Big).unwrap();
+        assert!(seam(&turn) < 1.5);
+        assert!(seam(&turn[..180 * 32]) > 50.0);
+        assert_eq!(cloud(&[0; 320]).seam_roughness(ByteOrder::Big), None);
     }
 
     #[test]

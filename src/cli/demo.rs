@@ -1,0 +1,142 @@
+//! `kreisel demo`: everything on one machine, without any set-up.
+
+use std::io::{IsTerminal as _, Write as _};
+use std::net::Ipv4Addr;
+use std::time::Duration;
+
+use anyhow::Result;
+use clap::Args;
+use tokio::time::{Instant, sleep_until};
+
+use super::{Completion, block_on, simulate, stop_signal};
+use crate::config::Configuration;
+use crate::daemon::session::{Sender, Session};
+use crate::daemon::{self, Options};
+use crate::simulate::{Simulation, scenario};
+use crate::wire::object_list::{Object, ObjectList};
+use crate::wire::{Envelope, Message};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// End after so many seconds [default: at Ctrl-C].
+    #[arg(long, value_name = "S", value_parser = simulate::duration)]
+    duration: Option<f64>,
+    /// Session to use on loopback.
+    #[arg(long, value_name = "N", default_value_t = 253, value_parser = clap::value_parser!(u8).range(1..=254))]
+    cid: u8,
+    /// Noise of the simulated sensor follows from it.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+/// senderStamp of the demo's objects, to tell them from those of another daemon.
+const SENDER_STAMP: u32 = 2021;
+const ROTATION_PERIOD: Duration = Duration::from_millis(100);
+
+pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
+    block_on(demonstrate(arguments))?;
+    Ok(Completion::Done)
+}
+
+async fn demonstrate(arguments: &Arguments) -> Result<()> {
+    let session = Session {
+        cid: arguments.cid,
+        interface: Some(Ipv4Addr::LOCALHOST),
+    };
+    let configuration = Configuration::default();
+    let sender = session.sender(&configuration.session)?;
+    let options = Options {
+        session,
+        sender_stamp: SENDER_STAMP,
+        configuration,
+    };
+    let end = arguments.duration.map(Duration::from_secs_f64);
+    let stop = async {
+        match end {
+            Some(duration) => tokio::select! {
+                () = tokio::time::sleep(duration) => {}
+                () = stop_signal() => {}
+            },
+            None => stop_signal().await,
+        }
+    };
+    tokio::select! {
+        result = daemon::run(options, stop) => Ok(result?),
+        result = send_revolutions(arguments.seed, &sender) => result,
+        result = show_objects(session) => result,
+    }
+}
+
+/// The simulated sensor at its own pace.
+async fn send_revolutions(seed: u64, sender: &Sender) -> Result<()> {
+    let Some(roundabout) = scenario::find("roundabout") else {
+        return Ok(());
+    };
+    let mut simulation = Simulation::new(roundabout, seed);
+    let mut frame = vec![];
+    let mut due = Instant::now();
+    loop {
+        frame.clear();
+        simulation.revolve(&mut frame);
+        due += ROTATION_PERIOD;
+        sleep_until(due).await;
+        sender.send(&frame)?;
+    }
+}
+
+/// Shows every list on a terminal, and one a second in a pipe.
+async fn show_objects(session: Session) -> Result<()> {
+    let (mut receiver, _sender) = session.join(&Configuration::default().session)?;
+    let terminal = std::io::stdout().is_terminal();
+    loop {
+        let (datagram, _) = receiver.receive().await?;
+        let Ok((envelope, _)) = Envelope::from_datagram(datagram) else {
+            continue;
+        };
+        let ours = envelope.data_type == ObjectList::ID && envelope.sender_stamp == SENDER_STAMP;
+        let Ok(list) = ObjectList::decode(envelope.payload, envelope.payload_offset) else {
+            continue;
+        };
+        if ours && (terminal || list.revolution % 10 == 0) {
+            let text = table(&list);
+            let clear = if terminal { "\x1b[H\x1b[2J" } else { "" };
+            let mut out = std::io::stdout().lock();
+            write!(out, "{clear}{text}")?;
+            out.flush()?;
+        }
+    }
+}
+
+fn table(list: &ObjectList) -> String {
+    let mut text = format!(
+        "revolution {}: {} objects in {:.2} ms\n{:>5} {:>7} {:>7} {:>6} {:>6} {:>14} {:>7}\n",
+        list.revolution,
+        list.count,
+        1000.0 * list.processing_time,
+        "id",
+        "x m",
+        "y m",
+        "m/s",
+        "yaw",
+        "l x w x h m",
+        "points"
+    );
+    for object in &list.objects.0 {
+        text.push_str(&row(object));
+    }
+    text
+}
+
+fn row(object: &Object) -> String {
+    let size = format!("{:.1}x{:.1}x{:.1}", object.length, object.width, object.height);
+    format!(
+        "{:>5} {:>7.1} {:>7.1} {:>6.1} {:>6.0} {:>14} {:>7}\n",
+        object.object_id,
+        object.x,
+        object.y,
+        object.speed,
+        object.yaw.to_degrees(),
+        size,
+        object.number_of_points
+    )
+}

@@ -1,0 +1,91 @@
+//! Files in and out, with errors that name them, and progress.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::config::{Configuration, text};
+use crate::wire::recording::Damage;
+
+/// A whole file.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).with_context(|| path.display().to_string())
+}
+
+/// The configuration in a file, or the default one.
+pub(super) fn configuration(path: Option<&Path>) -> Result<Configuration> {
+    let Some(path) = path else {
+        return Ok(Configuration::default());
+    };
+    let content = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    text::parse(&content).with_context(|| path.display().to_string())
+}
+
+/// A file that is written, whose errors name it.
+#[derive(Debug)]
+pub(super) struct Output {
+    path: PathBuf,
+    writer: BufWriter<File>,
+}
+
+impl Output {
+    /// Makes the file, or empties it.
+    pub(super) fn create(path: &Path) -> Result<Self> {
+        let file = File::create(path).with_context(|| path.display().to_string())?;
+        Ok(Self {
+            path: path.into(),
+            writer: BufWriter::new(file),
+        })
+    }
+
+    /// The same where a path may be left out.
+    pub(super) fn create_if(path: Option<&Path>) -> Result<Option<Self>> {
+        path.map(Self::create).transpose()
+    }
+
+    pub(super) fn put(&mut self, bytes: &[u8]) -> Result<()> {
+        let result = self.writer.write_all(bytes);
+        result.with_context(|| self.path.display().to_string())
+    }
+
+    /// Sees to it that everything is written.
+    pub(super) fn finish(mut self) -> Result<()> {
+        let result = self.writer.flush();
+        result.with_context(|| self.path.display().to_string())
+    }
+
+    /// The file itself, for writers that seek.
+    pub(super) fn into_file(self) -> Result<File> {
+        let path = self.path;
+        let file = self.writer.into_inner();
+        file.map_err(|error| error.into_error())
+            .with_context(|| path.display().to_string())
+    }
+}
+
+/// A progress bar on a terminal, nothing in a pipe.
+pub(super) fn progress(length: usize, unit: &str) -> ProgressBar {
+    let bar = ProgressBar::new(length as u64);
+    let template = if unit == "bytes" {
+        "{bar:40} {bytes}/{total_bytes} {eta}".into()
+    } else {
+        format!("{{bar:40}} {{pos}}/{{len}} {unit} {{eta}}")
+    };
+    if let Ok(style) = ProgressStyle::with_template(&template) {
+        bar.set_style(style);
+    }
+    bar
+}
+
+/// Says what is damaged in a file, in one line.
+pub(super) fn report_damage(path: &Path, damage: &Damage) {
+    eprintln!(
+        "kreisel: {}: {}; {} bytes skipped",
+        path.display(),
+        damage.error,
+        damage.skipped
+    );
+}

@@ -1,0 +1,173 @@
+//! `kreisel process`: the pipeline over a recording, without network and clock.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+
+use super::files::Output;
+use super::labels::LabelWriter;
+use super::{Completion, files, objects};
+use crate::pipeline::{Fault, Outcome, Pipeline, RevolutionReport};
+use crate::tally::Tally;
+use crate::time::Time;
+use crate::wire::envelope::Postmark;
+use crate::wire::recording::Entry;
+use crate::wire::{Envelope, Recording};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Recording to perceive.
+    #[arg(value_name = "IN.rec")]
+    input: PathBuf,
+    /// Recording of what `kreisel run` would multicast.
+    #[arg(long, value_name = "OUT.rec")]
+    output: Option<PathBuf>,
+    /// Objects, one line of JSON a revolution.
+    #[arg(long, value_name = "OUT.jsonl")]
+    objects: Option<PathBuf>,
+    /// Labels of all points, one array a revolution.
+    #[arg(long, value_name = "OUT.npz")]
+    labels: Option<PathBuf>,
+    /// Configuration file; `kreisel config` prints one.
+    #[arg(long, value_name = "FILE.toml")]
+    config: Option<PathBuf>,
+    /// senderStamp of what is sent.
+    #[arg(long, value_name = "STAMP", default_value_t = 0)]
+    id: u32,
+}
+
+/// Seconds of recorded time between two Status messages.
+const STATUS_PERIOD_S: f64 = 1.0;
+
+struct Process<'a> {
+    arguments: &'a Arguments,
+    pipeline: Pipeline,
+    output: Option<Output>,
+    objects: Option<Output>,
+    labels: Option<LabelWriter>,
+    frame: Vec<u8>,
+    status_due: Option<Time>,
+    faults: Tally,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
+    let configuration = files::configuration(arguments.config.as_deref())?;
+    let bytes = files::read(&arguments.input)?;
+    let mut process = Process {
+        arguments,
+        pipeline: Pipeline::new(&configuration, arguments.id),
+        output: Output::create_if(arguments.output.as_deref())?,
+        objects: Output::create_if(arguments.objects.as_deref())?,
+        labels: arguments.labels.as_deref().map(LabelWriter::create).transpose()?,
+        frame: vec![],
+        status_due: None,
+        faults: Tally::default(),
+    };
+    let bar = files::progress(bytes.len(), "bytes");
+    let mut damages = 0;
+    for item in Recording::new(&bytes) {
+        match item {
+            Ok(entry) => {
+                bar.set_position(entry.offset as u64);
+                process.take(&entry)?;
+            }
+            Err(damage) => {
+                damages += 1;
+                files::report_damage(&arguments.input, &damage);
+            }
+        }
+    }
+    bar.finish_and_clear();
+    process.finish(damages)
+}
+
+impl Process<'_> {
+    fn take(&mut self, entry: &Entry<'_>) -> Result<()> {
+        match self.pipeline.handle(&entry.envelope) {
+            Ok(Outcome::Revolution(report)) => self.answer(&report),
+            Ok(_) => Ok(()),
+            Err(fault) => {
+                self.report(entry.offset, &entry.envelope, &fault);
+                Ok(())
+            }
+        }
+    }
+
+    /// One line for the first fault of a kind; the rest are counted.
+    fn report(&mut self, offset: usize, envelope: &Envelope<'_>, fault: &Fault) {
+        self.faults.count(fault.name());
+        if self.faults.get(fault.name()) == 1 {
+            eprintln!(
+                "kreisel: {}: byte {offset}: message {}: {}: {fault}",
+                self.arguments.input.display(),
+                envelope.data_type,
+                fault.name(),
+            );
+        }
+    }
+
+    fn answer(&mut self, report: &RevolutionReport) -> Result<()> {
+        if let Some(output) = &mut self.output {
+            for frame in self.pipeline.publish(report.time, 0.0) {
+                output.put(frame)?;
+            }
+        }
+        self.put_status(report.time)?;
+        if let Some(output) = &mut self.objects {
+            output.put(&objects::line(report, self.pipeline.objects())?)?;
+        }
+        if let Some(labels) = &mut self.labels {
+            labels.put(&self.pipeline, report.number)?;
+        }
+        Ok(())
+    }
+
+    /// Status once a second of recorded time.
+    fn put_status(&mut self, now: Time) -> Result<()> {
+        let period = crate::time::Span::from_seconds(STATUS_PERIOD_S);
+        let due = *self.status_due.get_or_insert(now + period);
+        let jumped_back = (due - now) > period;
+        if now < due && !jumped_back {
+            return Ok(());
+        }
+        self.status_due = Some(now + period);
+        if let Some(output) = &mut self.output {
+            let postmark = Postmark {
+                sent: now,
+                sampled: now,
+                sender_stamp: self.arguments.id,
+            };
+            self.frame.clear();
+            postmark.put(&mut self.frame, &self.pipeline.status());
+            output.put(&self.frame)?;
+        }
+        Ok(())
+    }
+
+    fn finish(self, damages: usize) -> Result<Completion> {
+        for output in [self.output, self.objects].into_iter().flatten() {
+            output.finish()?;
+        }
+        if let Some(labels) = self.labels {
+            labels.finish()?;
+        }
+        let status = self.pipeline.status();
+        println!(
+            "{} point clouds: {} answered, {} refused, {} damaged; {damages} damaged stretches",
+            status.revolutions_received,
+            status.revolutions_published,
+            status.revolutions_refused,
+            status.datagrams_damaged,
+        );
+        if self.faults.total() > 0 {
+            eprintln!("kreisel: {}: {}", self.arguments.input.display(), self.faults);
+        }
+        let all_refused = status.revolutions_received > 0 && status.revolutions_published == 0;
+        if damages > 0 || status.datagrams_damaged > 0 || all_refused {
+            Ok(Completion::Damaged)
+        } else {
+            Ok(Completion::Done)
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! `kreisel record`: a session into a file.
+
+use std::path::PathBuf;
+use std::pin::pin;
+
+use anyhow::Result;
+use clap::Args;
+
+use super::files::Output;
+use super::{Completion, SessionArguments, block_on, stop_signal};
+use crate::config::Configuration;
+use crate::wire::{Envelope, frame};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Recording to write.
+    #[arg(value_name = "FILE.rec")]
+    output: PathBuf,
+    #[command(flatten)]
+    session: SessionArguments,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
+    let mut output = Output::create(&arguments.output)?;
+    let (written, damaged) = block_on(record(arguments, &mut output))?;
+    output.finish()?;
+    eprintln!("kreisel: {written} envelopes written, {damaged} damaged datagrams left out");
+    Ok(Completion::Done)
+}
+
+async fn record(arguments: &Arguments, output: &mut Output) -> Result<(u64, u64)> {
+    let parameters = Configuration::default().session;
+    let (mut receiver, _sender) = arguments.session.session().join(&parameters)?;
+    tracing::info!("recording {}; Ctrl-C ends it", receiver.group());
+    let mut stop = pin!(stop_signal());
+    let (mut written, mut damaged, mut lost) = (0, 0, 0);
+    loop {
+        let (datagram, arrival) = tokio::select! {
+            received = receiver.receive() => received?,
+            () = &mut stop => return Ok((written, damaged)),
+        };
+        if arrival.kernel_dropped > lost {
+            lost = arrival.kernel_dropped;
+            tracing::warn!("{lost} datagrams lost so far: the receive buffer was full");
+        }
+        // Only what is sound: one damaged frame would hide what follows from other readers.
+        match (Envelope::from_datagram(datagram), frame::split(datagram, 0)) {
+            (Ok(_), Ok((_, end))) => {
+                output.put(&datagram[..end])?;
+                written += 1;
+            }
+            _ => damaged += 1,
+        }
+    }
+}

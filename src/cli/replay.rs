@@ -1,0 +1,111 @@
+//! `kreisel replay`: a recording back onto the network.
+
+use std::path::PathBuf;
+use std::pin::pin;
+use std::time::Duration;
+
+use anyhow::{Context as _, Result, bail};
+use clap::Args;
+use tokio::time::{Instant, sleep_until};
+
+use super::{Completion, SessionArguments, block_on, files, stop_signal};
+use crate::config::Configuration;
+use crate::daemon::session::Sender;
+use crate::wire::Recording;
+use crate::wire::frame::MAX_DATAGRAM_LEN;
+use crate::wire::recording::Entry;
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Recording to play.
+    #[arg(value_name = "FILE.rec")]
+    input: PathBuf,
+    #[command(flatten)]
+    session: SessionArguments,
+    /// Times as fast as recorded.
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive)]
+    speed: f64,
+    /// Begin again at the end.
+    #[arg(long = "loop")]
+    repeat: bool,
+}
+
+/// Longest pause that is waited for, as in libcluon's player: what is longer is a gap in the
+/// recording or a time stamp from elsewhere.
+const LONGEST_PAUSE_S: f64 = 1.0;
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
+        _ => Err("not a number above 0".into()),
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
+    let bytes = files::read(&arguments.input)?;
+    let (mut entries, mut completion) = (vec![], Completion::Done);
+    for item in Recording::new(&bytes) {
+        match item {
+            Ok(entry) if entry.frame.len() > MAX_DATAGRAM_LEN => {
+                let (path, length) = (arguments.input.display(), entry.frame.len());
+                eprintln!(
+                    "kreisel: {path}: byte {}: {length} bytes do not fit a datagram; skipped",
+                    entry.offset
+                );
+                completion = Completion::Damaged;
+            }
+            Ok(entry) => entries.push(entry),
+            Err(damage) => {
+                files::report_damage(&arguments.input, &damage);
+                completion = Completion::Damaged;
+            }
+        }
+    }
+    if entries.is_empty() {
+        bail!("{}: byte 0: no envelope to play", arguments.input.display());
+    }
+    block_on(async {
+        tokio::select! {
+            result = play(arguments, &entries) => result,
+            () = pin!(stop_signal()) => Ok(()),
+        }
+    })?;
+    Ok(completion)
+}
+
+async fn play(arguments: &Arguments, entries: &[Entry<'_>]) -> Result<()> {
+    let session = arguments.session.session();
+    let sender = session.sender(&Configuration::default().session)?;
+    tracing::info!("playing {} envelopes to {}", entries.len(), session.group());
+    let mut due = Instant::now();
+    loop {
+        due = play_once(arguments, entries, &sender, due).await?;
+        if !arguments.repeat {
+            return Ok(());
+        }
+    }
+}
+
+/// Plays the recording once, from `due` on; gives when it ended.
+async fn play_once(
+    arguments: &Arguments,
+    entries: &[Entry<'_>],
+    sender: &Sender,
+    mut due: Instant,
+) -> Result<Instant> {
+    let bar = files::progress(entries.len(), "envelopes");
+    let mut last = None;
+    for entry in entries {
+        let time = entry.envelope.time();
+        let passed_s = last.map_or(0.0, |last| (time - last).seconds());
+        last = Some(time);
+        due += Duration::from_secs_f64(passed_s.clamp(0.0, LONGEST_PAUSE_S) / arguments.speed);
+        sleep_until(due).await;
+        let sent = sender.send(entry.frame);
+        sent.with_context(|| format!("cannot send to {}", arguments.session.session().group()))?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    // A loop of one envelope must not become a flood.
+    Ok(due.max(Instant::now()) + Duration::from_millis(100).div_f64(arguments.speed))
+}

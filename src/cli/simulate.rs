@@ -1,0 +1,82 @@
+//! `kreisel simulate`: a synthetic session with truth.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+
+use super::files::{Output, progress};
+use super::{Completion, objects};
+use crate::simulate::Simulation;
+use crate::simulate::scenario::{self, Scenario};
+
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Scenario to simulate.
+    #[arg(value_name = "SCENARIO", value_parser = find, required_unless_present = "list")]
+    scenario: Option<Scenario>,
+    /// List the scenarios.
+    #[arg(long)]
+    list: bool,
+    /// The noise follows from it: the same seed gives the same bytes.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// How long, in seconds.
+    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = duration)]
+    duration: f64,
+    /// Recording to write.
+    #[arg(long, value_name = "FILE.rec", required_unless_present = "list")]
+    output: Option<PathBuf>,
+    /// Truth to write, one line of JSON a revolution.
+    #[arg(long, value_name = "FILE.jsonl")]
+    truth: Option<PathBuf>,
+}
+
+/// A day: longer ones are a slip of the pen.
+const LONGEST_S: f64 = 86_400.0;
+/// Revolutions a second.
+const ROTATION_HZ: f64 = 10.0;
+
+fn find(name: &str) -> Result<Scenario, String> {
+    let names = || scenario::all().iter().map(|s| s.name).collect::<Vec<_>>().join(", ");
+    scenario::find(name).ok_or_else(|| format!("there is no such scenario; there are: {}", names()))
+}
+
+/// A duration in seconds.
+pub(super) fn duration(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds > 0.0 && seconds <= LONGEST_S => Ok(seconds),
+        _ => Err(format!("not a number of seconds above 0 and up to {LONGEST_S}")),
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
+    if arguments.list {
+        for scenario in scenario::all() {
+            println!("{}: {}", scenario.name, scenario.summary);
+        }
+        return Ok(Completion::Done);
+    }
+    let (Some(scenario), Some(path)) = (&arguments.scenario, &arguments.output) else {
+        return Ok(Completion::Done);
+    };
+    let mut output = Output::create(path)?;
+    let mut truth = Output::create_if(arguments.truth.as_deref())?;
+    let revolutions = (arguments.duration * ROTATION_HZ).round().max(1.0) as usize;
+    let bar = progress(revolutions, "revolutions");
+    let mut simulation = Simulation::new(scenario.clone(), arguments.seed);
+    let mut frame = vec![];
+    for _ in 0..revolutions {
+        frame.clear();
+        let was = simulation.revolve(&mut frame);
+        output.put(&frame)?;
+        if let Some(truth) = &mut truth {
+            truth.put(&objects::truth_line(&was)?)?;
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    output.finish()?;
+    truth.map_or(Ok(()), Output::finish)?;
+    Ok(Completion::Done)
+}
