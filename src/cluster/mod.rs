@@ -33,10 +33,10 @@ parameters! {
         /// Columns to either side when window is "columns": 2 makes 5 x 16 = 80 candidates.
         window_columns: usize = 2, in 1..=200, "columns";
         /// Distance within which two returns are neighbours, at range 0.
-        eps_m: f64 = 0.6, thesis 1.8, in 0.05..=5.0, "m";
+        eps_m: f64 = 0.5, thesis 1.8, in 0.05..=5.0, "m";
         /// What is added to that distance for each metre of range; of two returns, the nearer
         /// one's counts. Layers are 0.035 m apart for each metre.
-        eps_per_m: f64 = 0.01, thesis 0.0, in 0.0..=0.1, "m/m";
+        eps_per_m: f64 = 0.022, thesis 0.0, in 0.0..=0.1, "m/m";
         /// Neighbours, itself included, that make a return a core point near the sensor.
         min_points: usize = 8, thesis 5, in 1..=100, "returns";
         /// The same far from the sensor, where a pedestrian returns 7 points in all.

@@ -31,12 +31,14 @@ impl Identities {
 
     /// The ids of new clusters: that of the nearest old one within the gate, else the next
     /// one in ascending order. Every old cluster hands its id to the nearest new one, and to
-    /// others only within the distance at which they may be pieces of one object.
+    /// others only within the distance at which they may be pieces of one object. Where an
+    /// object is expected already (`owner`), a new cluster is a piece of it.
     pub(super) fn assign(
         &mut self,
         centres_m: &[[f64; 2]],
         now: Time,
         velocity: impl Fn(u32) -> [f64; 2],
+        owner: impl Fn(&[f64; 2]) -> Option<u32>,
         parameters: &TrackParameters,
     ) -> &[u32] {
         self.move_known(now, velocity, parameters.predict);
@@ -46,9 +48,10 @@ impl Identities {
             .collect();
         let heirs = self.heirs(&nearest);
         self.ids.clear();
-        for (new, nearest) in nearest.iter().enumerate() {
-            let id = match nearest {
-                Some((distance_m, old))
+        for (new, (nearest, centre_m)) in nearest.iter().zip(centres_m).enumerate() {
+            let id = match (owner(centre_m), nearest) {
+                (Some(id), _) => id,
+                (None, Some((distance_m, old)))
                     if heirs[*old] == Some(new) || *distance_m <= parameters.share_distance_m =>
                 {
                     self.known[*old].id
@@ -144,7 +147,8 @@ mod tests {
             self.micros += 100_000;
             let now = Time::from_micros(self.micros);
             let still = |_| [0.0; 2];
-            self.identities.assign(centres_m, now, still, &self.parameters).to_vec()
+            let nobody = |_: &[f64; 2]| None;
+            self.identities.assign(centres_m, now, still, nobody, &self.parameters).to_vec()
         }
     }
 
@@ -184,8 +188,9 @@ mod tests {
         let parameters = TrackParameters::profile(Profile::Default);
         let at = |tenths: i64| Time::from_micros(tenths * 100_000);
         let along_x = |_| [10.0, 0.0];
-        assert_eq!(identities.assign(&[[0.0, 0.0]], at(0), along_x, &parameters), [0]);
+        let nobody = |_: &[f64; 2]| None;
+        assert_eq!(identities.assign(&[[0.0, 0.0]], at(0), along_x, nobody, &parameters), [0]);
         // Half a second unseen: five metres on.
-        assert_eq!(identities.assign(&[[5.0, 0.0]], at(5), along_x, &parameters), [0]);
+        assert_eq!(identities.assign(&[[5.0, 0.0]], at(5), along_x, nobody, &parameters), [0]);
     }
 }

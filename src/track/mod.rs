@@ -26,7 +26,7 @@ parameters! {
         association_distance_m: f64 = 3.0, in 0.1..=20.0, "m";
         /// A further cluster within this distance of the same old one gets its id, too, because
         /// objects fall apart. Large values glue neighbours together.
-        share_distance_m: f64 = 1.0, thesis 3.0, in 0.0..=20.0, "m";
+        share_distance_m: f64 = 0.5, thesis 3.0, in 0.0..=20.0, "m";
         /// Whether old clusters are moved by their velocity before they are compared.
         predict: bool = true, thesis false, "";
         /// How long an id is kept for a cluster that is not seen.
@@ -35,22 +35,34 @@ parameters! {
         /// to the next. A longer one is calmer and later.
         velocity_baseline_s: f64 = 0.5, thesis 0.0, in 0.0..=2.0, "s";
         /// Whether a box that shows one side of a vehicle is completed to a whole car, away
-        /// from the sensor.
+        /// from the sensor, and further clusters within it get its id.
         complete_boxes: bool = true, thesis false, "";
         /// Longest side of a cluster that can be a road user; longer ones are structure.
         longest_object_m: f64 = 20.0, thesis 1000.0, in 1.0..=1000.0, "m";
+        /// Greatest height above the ground of a cluster that can be a road user; higher ones
+        /// are houses, poles and trees.
+        highest_object_m: f64 = 4.5, thesis 1000.0, in 1.0..=1000.0, "m";
+        /// Height above the ground at which a road user must have begun; what begins higher
+        /// hangs over the road.
+        clearance_m: f64 = 2.0, thesis 1000.0, in 0.1..=1000.0, "m";
     }
 }
 
-/// Mass of the car whose hidden part is assumed: the average of new cars in Europe.
+/// Size of the car whose hidden part is assumed: the average of new cars in Europe.
 const CAR_LENGTH_M: f64 = 4.3;
 const CAR_WIDTH_M: f64 = 1.8;
 /// Visible sides between these are taken for the width of a vehicle...
 const VEHICLE_WIDTH_M: std::ops::RangeInclusive<f64> = 1.3..=2.6;
 /// ...and heights between these for its height.
 const VEHICLE_HEIGHT_M: std::ops::RangeInclusive<f64> = 0.9..=3.5;
+/// A cluster that begins above the first height and ends above the second is the cabin of a
+/// car, whose body returned too low to be told from the road.
+const CABIN_FLOOR_M: f64 = 0.45;
+const CABIN_ROOF_M: f64 = 1.1;
+/// Margin around a predicted box within which a cluster is a piece of it.
+const PIECE_MARGIN_M: f64 = 0.4;
 /// Above this speed an object moves along its length.
-const MOVING_MPS: f64 = 1.5;
+const MOVING_MPS: f64 = 0.8;
 /// Standard deviation of where the middle of a cluster is seen.
 const CENTRE_DEVIATION_M: f64 = 0.1;
 /// Of a speed that was not measured yet: it may be any in a town.
@@ -87,6 +99,23 @@ pub struct Object {
     pub points: usize,
 }
 
+impl Object {
+    /// Its box from above.
+    pub fn rectangle(&self) -> Rectangle {
+        Rectangle {
+            centre_m: [self.centre_m[0], self.centre_m[1]],
+            yaw_rad: self.yaw_rad,
+            length_m: self.length_m,
+            width_m: self.width_m,
+        }
+    }
+
+    fn velocity_mps(&self) -> [f64; 2] {
+        let (sine, cosine) = libm::sincos(self.yaw_rad);
+        [self.speed_mps * cosine, self.speed_mps * sine]
+    }
+}
+
 /// The track step.
 #[derive(Debug, Clone)]
 pub struct Tracker {
@@ -96,6 +125,7 @@ pub struct Tracker {
     /// Clusters of this revolution that may be road users, with their centres.
     seen: Vec<Seen>,
     objects: Vec<Object>,
+    objects_time: Time,
     outline: Vec<[f64; 2]>,
 }
 
@@ -117,6 +147,7 @@ impl Tracker {
             motions: vec![],
             seen: vec![],
             objects: vec![],
+            objects_time: Time::ZERO,
             outline: vec![],
         }
     }
@@ -125,6 +156,7 @@ impl Tracker {
     pub fn reset(&mut self) {
         self.identities.forget();
         self.motions.clear();
+        self.objects.clear();
     }
 
     /// The objects of the last revolution, by id.
@@ -134,7 +166,7 @@ impl Tracker {
 
     /// Takes the clusters of a revolution in.
     pub fn process(&mut self, scan: &Scan, clusters: &Clusters, ground: &Plane) -> &[Object] {
-        self.see(scan, clusters);
+        self.see(scan, clusters, ground);
         self.identify(scan.time());
         self.objects.clear();
         let seen = std::mem::take(&mut self.seen);
@@ -146,31 +178,20 @@ impl Tracker {
         &self.objects
     }
 
-    fn see(&mut self, scan: &Scan, clusters: &Clusters) {
+    /// Notes the clusters that can be road users.
+    fn see(&mut self, scan: &Scan, clusters: &Clusters, ground: &Plane) {
         self.seen.clear();
         for (cluster, points) in clusters.iter().enumerate() {
-            let [mut low, mut high, mut sum] = [[f64::MAX; 2], [f64::MIN; 2], [0.0; 2]];
-            let mut age_s = 0.0;
-            for point in points {
-                let [x, y, _] = scan.point_m(*point as usize).map(f64::from);
-                for (axis, value) in [x, y].into_iter().enumerate() {
-                    low[axis] = low[axis].min(value);
-                    high[axis] = high[axis].max(value);
-                    sum[axis] += value;
-                }
-                age_s += scan.age_s(scan.column(*point as usize));
+            let extent = Extent::of(scan, points, ground);
+            if extent.can_be_road_user(&self.parameters) {
+                let age = crate::time::Span::from_seconds(-extent.mean_age_s);
+                self.seen.push(Seen {
+                    cluster,
+                    id: 0,
+                    centre_m: extent.centre_m,
+                    time: scan.time() + age,
+                });
             }
-            let longest_m = (high[0] - low[0]).max(high[1] - low[1]);
-            if longest_m > self.parameters.longest_object_m {
-                continue;
-            }
-            let count = points.len() as f64;
-            self.seen.push(Seen {
-                cluster,
-                id: 0,
-                centre_m: sum.map(|sum| sum / count),
-                time: scan.time() + crate::time::Span::from_seconds(-age_s / count),
-            });
         }
     }
 
@@ -181,12 +202,24 @@ impl Tracker {
             let motion = self.motions.iter().find(|motion| motion.id() == id);
             motion.map_or([0.0; 2], |motion| motion.velocity().mps)
         };
-        let ids = self.identities.assign(&centres, now, velocity, &self.parameters);
+        let parameters = &self.parameters;
+        let objects = parameters.complete_boxes.then_some(&self.objects[..]);
+        let boxes = objects.unwrap_or(&[]).iter().map(|object| {
+            let passed_s = (now - self.objects_time).seconds();
+            (object.id, object.rectangle().moved(object.velocity_mps(), passed_s))
+        });
+        let boxes: Vec<(u32, Rectangle)> = boxes.collect();
+        let owner = |centre_m: &[f64; 2]| {
+            let around = |(_, rectangle): &&(u32, Rectangle)| rectangle.contains(centre_m, PIECE_MARGIN_M);
+            boxes.iter().find(around).map(|(id, _)| *id)
+        };
+        let ids = self.identities.assign(&centres, now, velocity, owner, parameters);
         for (seen, id) in self.seen.iter_mut().zip(ids) {
             seen.id = *id;
         }
         self.seen.sort_by_key(|seen| (seen.id, seen.cluster));
         self.motions.retain(|motion| self.identities.knows(motion.id()));
+        self.objects_time = now;
     }
 
     fn object(
@@ -203,10 +236,11 @@ impl Tracker {
         let (first_seen, existence) = (motion.first_seen(), motion.existence());
 
         self.outline.clear();
-        let mut height_m = 0.0f64;
+        let (mut floor_gap_m, mut height_m) = (f64::MAX, 0.0f64);
         for point in points() {
             let position = scan.point_m(*point as usize).map(f64::from);
-            height_m = height_m.max(ground.above_m(&position.into()));
+            let above_m = ground.above_m(&position.into());
+            (floor_gap_m, height_m) = (floor_gap_m.min(above_m), height_m.max(above_m));
             self.outline.push([position[0], position[1]]);
         }
         let [vx, vy] = velocity.mps;
@@ -215,7 +249,8 @@ impl Tracker {
         let measured = Rectangle::fit(&self.outline, heading_rad);
         let mut rectangle = measured;
         if self.parameters.complete_boxes && VEHICLE_HEIGHT_M.contains(&height_m) {
-            rectangle = completed(measured, heading_rad);
+            let is_cabin = floor_gap_m > CABIN_FLOOR_M && height_m > CABIN_ROOF_M;
+            rectangle = completed(measured, heading_rad, is_cabin);
         }
 
         // What was seen earlier in the sweep has moved on since.
@@ -261,6 +296,46 @@ impl Tracker {
     }
 }
 
+/// What must be known of a cluster to tell whether it can be a road user.
+struct Extent {
+    low_m: [f64; 3],
+    high_m: [f64; 3],
+    centre_m: [f64; 2],
+    mean_age_s: f64,
+}
+
+impl Extent {
+    /// East, north, and above the ground.
+    fn of(scan: &Scan, points: &[u32], ground: &Plane) -> Self {
+        let [mut low_m, mut high_m, mut sum_m] = [[f64::MAX; 3], [f64::MIN; 3], [0.0; 3]];
+        let mut age_s = 0.0;
+        for point in points {
+            let position = scan.point_m(*point as usize).map(f64::from);
+            let above_m = ground.above_m(&position.into());
+            for (axis, value) in [position[0], position[1], above_m].into_iter().enumerate() {
+                low_m[axis] = low_m[axis].min(value);
+                high_m[axis] = high_m[axis].max(value);
+                sum_m[axis] += value;
+            }
+            age_s += scan.age_s(scan.column(*point as usize));
+        }
+        let count = points.len() as f64;
+        Self {
+            low_m,
+            high_m,
+            centre_m: [sum_m[0] / count, sum_m[1] / count],
+            mean_age_s: age_s / count,
+        }
+    }
+
+    fn can_be_road_user(&self, parameters: &TrackParameters) -> bool {
+        let side_m = |axis: usize| self.high_m[axis] - self.low_m[axis];
+        side_m(0).max(side_m(1)) <= parameters.longest_object_m
+            && self.high_m[2] <= parameters.highest_object_m
+            && self.low_m[2] <= parameters.clearance_m
+    }
+}
+
 fn mean_time(pieces: &[Seen]) -> Time {
     let first = pieces[0].time;
     let sum: i64 = pieces.iter().map(|seen| (seen.time - first).micros()).sum();
@@ -276,20 +351,26 @@ fn floor_below(ground: &Plane, [x, y]: [f64; 2]) -> f64 {
 /// A box that shows one or two sides of a vehicle, grown to a whole car away from the sensor.
 /// A moving one has its length along the motion; of a standing one a visible side as long as
 /// a vehicle is wide is its front or rear.
-fn completed(seen: Rectangle, heading_rad: Option<f64>) -> Rectangle {
+/// A cabin sits in the middle of its car and grows to all sides.
+fn completed(seen: Rectangle, heading_rad: Option<f64>, is_cabin: bool) -> Rectangle {
     let is_wide = |across_m: f64| VEHICLE_WIDTH_M.contains(&across_m);
+    let to_car = |seen: Rectangle| {
+        let car = seen.grown(CAR_LENGTH_M, CAR_WIDTH_M);
+        let centre_m = if is_cabin { seen.centre_m } else { car.centre_m };
+        Rectangle { centre_m, ..car }
+    };
     if heading_rad.is_some() {
         let side_view = seen.length_m > *VEHICLE_WIDTH_M.end();
         return if is_wide(seen.width_m) || side_view {
-            seen.grown(CAR_LENGTH_M, CAR_WIDTH_M)
+            to_car(seen)
         } else {
             seen
         };
     }
     if seen.length_m > *VEHICLE_WIDTH_M.end() {
-        seen.grown(CAR_LENGTH_M, CAR_WIDTH_M)
+        to_car(seen)
     } else if is_wide(seen.length_m) && seen.length_m > 1.5 {
-        seen.quarter_turned().grown(CAR_LENGTH_M, CAR_WIDTH_M)
+        to_car(seen.quarter_turned())
     } else {
         seen
     }

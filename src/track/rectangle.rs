@@ -70,6 +70,24 @@ impl Rectangle {
         }
     }
 
+    /// Whether a place lies within the rectangle, or within a margin around it.
+    pub(super) fn contains(&self, [x, y]: &[f64; 2], margin_m: f64) -> bool {
+        let (sine, cosine) = libm::sincos(self.yaw_rad);
+        let offset = [x - self.centre_m[0], y - self.centre_m[1]];
+        let [along_m, across_m] = turned(&offset, sine, cosine);
+        libm::fabs(along_m) <= 0.5 * self.length_m + margin_m
+            && libm::fabs(across_m) <= 0.5 * self.width_m + margin_m
+    }
+
+    /// Where it is after some time at a velocity.
+    pub(super) fn moved(self, [vx, vy]: [f64; 2], seconds: f64) -> Self {
+        let [x, y] = self.centre_m;
+        Self {
+            centre_m: [x + vx * seconds, y + vy * seconds],
+            ..self
+        }
+    }
+
     /// At least so long and so wide, grown away from the sensor: the edges that it sees stay.
     pub fn grown(self, length_m: f64, width_m: f64) -> Self {
         let (sine, cosine) = libm::sincos(self.yaw_rad);
