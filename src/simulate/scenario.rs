@@ -163,8 +163,8 @@ fn roundabout() -> Scenario {
             actor(Class::Car, 12.0, 200.0, 8.0),
             actor(Class::Car, 12.0, 320.0, 8.0),
             actor(Class::Car, 12.0, 80.0, 8.0),
-            actor(Class::Cyclist, 16.5, 230.0, 4.17),
-            actor(Class::Pedestrian, 20.0, 300.0, -1.39),
+            actor(Class::Cyclist, 16.5, 10.0, 4.17),
+            actor(Class::Pedestrian, 20.5, 305.0, -1.39),
         ],
         statics: vec![
             // Planting on the island, lamp posts around it, walls and a house farther off.

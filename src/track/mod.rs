@@ -58,9 +58,9 @@ const VEHICLE_HEIGHT_M: std::ops::RangeInclusive<f64> = 0.9..=3.5;
 /// A cluster that begins above the first height and ends above the second is the cabin of a
 /// car, whose body returned too low to be told from the road.
 const CABIN_FLOOR_M: f64 = 0.45;
-const CABIN_ROOF_M: f64 = 1.1;
+const CABIN_ROOF_M: f64 = 0.95;
 /// Margin around a predicted box within which a cluster is a piece of it.
-const PIECE_MARGIN_M: f64 = 0.4;
+const PIECE_MARGIN_M: f64 = 0.8;
 /// Above this speed an object moves along its length.
 const MOVING_MPS: f64 = 0.8;
 /// Standard deviation of where the middle of a cluster is seen.
