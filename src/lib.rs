@@ -9,10 +9,7 @@
 //!
 //! Everything but the shell is pure: no I/O, no clock, no thread, no global state. The same
 //! envelopes and the same configuration give the same bytes.
-#![cfg_attr(
-    test,
-    allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)
-)]
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 // Bytes to messages, messages to bytes.
 pub mod wire;

@@ -3,8 +3,8 @@
 use crate::config::{choices, parameters};
 use crate::time::{Span, Time};
 use crate::track::Object;
-use crate::wire::environment::{Direction, Environment, PerceivedObject};
 use crate::wire::envelope::Postmark;
+use crate::wire::environment::{Direction, Environment, PerceivedObject};
 use crate::wire::message::List;
 use crate::wire::object_list::ObjectList;
 use crate::wire::{Message, TimeStamp, object_list, opendlv};
@@ -118,7 +118,13 @@ impl Publisher {
             let (object_id, sight) = (object.id, Sight::of(object));
             let [x, y, z] = object.centre_m.map(|metres| metres as f32);
             self.put(postmark, &opendlv::ObjectAnnouncement { object_id });
-            self.put(postmark, &opendlv::ObjectType { object_id, kind: UNCLASSIFIED });
+            self.put(
+                postmark,
+                &opendlv::ObjectType {
+                    object_id,
+                    kind: UNCLASSIFIED,
+                },
+            );
             self.put(
                 postmark,
                 &opendlv::ObjectDirection {
@@ -128,7 +134,13 @@ impl Publisher {
                 },
             );
             let distance = sight.distance_m as f32;
-            self.put(postmark, &opendlv::ObjectDistance { object_id, distance });
+            self.put(
+                postmark,
+                &opendlv::ObjectDistance {
+                    object_id,
+                    distance,
+                },
+            );
             self.put(
                 postmark,
                 &opendlv::ObjectAngularBlob {
@@ -309,7 +321,10 @@ mod tests {
         let (envelope, _) = Envelope::from_datagram(frames[0]).unwrap();
         let list = ObjectList::decode(envelope.payload, 0).unwrap();
         assert_eq!((frames.len(), list.count, list.revolution), (1, 0, 7));
-        assert_eq!((envelope.sender_stamp, envelope.time()), (42, heading().time));
+        assert_eq!(
+            (envelope.sender_stamp, envelope.time()),
+            (42, heading().time)
+        );
     }
 
     #[test]
@@ -332,7 +347,9 @@ mod tests {
 
     #[test]
     fn the_longest_list_fits_a_datagram_and_says_what_it_left_out() {
-        let objects: Vec<_> = (0..1000).map(|id| object(u32::MAX - 1000 + id, f64::from(id), 1.0)).collect();
+        let objects: Vec<_> = (0..1000)
+            .map(|id| object(u32::MAX - 1000 + id, f64::from(id), 1.0))
+            .collect();
         let publisher = publish(|parameters| parameters.most_objects = 400, &objects);
         let frame = publisher.frames().next().unwrap();
         let (envelope, _) = Envelope::from_datagram(frame).unwrap();

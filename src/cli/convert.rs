@@ -115,7 +115,9 @@ impl Conversion {
                 sender_stamp: arguments.id,
             };
             self.frame.clear();
-            postmark.put_payload(&mut self.frame, POINT_CLOUD_ID, |out| sweep.cloud().encode(out));
+            postmark.put_payload(&mut self.frame, POINT_CLOUD_ID, |out| {
+                sweep.cloud().encode(out)
+            });
             output.put(&self.frame)?;
             self.revolutions += 1;
         }
@@ -127,7 +129,10 @@ impl Conversion {
         for (count, what) in [
             (self.other_sources, "packets of other sensors left out"),
             (self.broken, "packets without block flags left out"),
-            (self.dual_returns, "packets in dual return mode, which the device service takes for more columns"),
+            (
+                self.dual_returns,
+                "packets in dual return mode, which the device service takes for more columns",
+            ),
         ] {
             if count > 0 {
                 eprintln!("kreisel: {path}: {count} {what}");
@@ -157,7 +162,11 @@ fn walk(
                     }
                     PcapBlockOwned::NG(Block::SectionHeader(_)) => links.clear(),
                     PcapBlockOwned::NG(Block::InterfaceDescription(interface)) => {
-                        links.push((interface.linktype, interface.if_tsoffset, interface.if_tsresol));
+                        links.push((
+                            interface.linktype,
+                            interface.if_tsoffset,
+                            interface.if_tsresol,
+                        ));
                     }
                     _ => {}
                 }
@@ -191,7 +200,11 @@ fn captured<'a>(
     match block {
         PcapBlockOwned::Legacy(record) => {
             let fraction = i64::from(record.ts_usec);
-            let micros = if nanoseconds { fraction / 1000 } else { fraction };
+            let micros = if nanoseconds {
+                fraction / 1000
+            } else {
+                fraction
+            };
             Some(Captured {
                 time: Time::from_micros(i64::from(record.ts_sec) * 1_000_000 + micros),
                 link: links.first()?.0,
@@ -201,7 +214,8 @@ fn captured<'a>(
         PcapBlockOwned::NG(Block::EnhancedPacket(packet)) => {
             let (link, offset_s, resolution) = *links.get(packet.if_id as usize)?;
             let ticks = u64::from(packet.ts_high) << 32 | u64::from(packet.ts_low);
-            let micros = micros(ticks, resolution)?.checked_add(offset_s.checked_mul(1_000_000)?)?;
+            let micros =
+                micros(ticks, resolution)?.checked_add(offset_s.checked_mul(1_000_000)?)?;
             Some(Captured {
                 time: Time::from_micros(micros),
                 link,
@@ -216,7 +230,11 @@ fn captured<'a>(
 /// the highest bit is set.
 fn micros(ticks: u64, resolution: u8) -> Option<i64> {
     const DEFAULT_RESOLUTION: u8 = 6;
-    let resolution = if resolution == 0 { DEFAULT_RESOLUTION } else { resolution };
+    let resolution = if resolution == 0 {
+        DEFAULT_RESOLUTION
+    } else {
+        resolution
+    };
     let exponent = u32::from(resolution & 0x7f);
     let base: u128 = if resolution & 0x80 == 0 { 10 } else { 2 };
     let per_second = base.checked_pow(exponent)?;
@@ -258,6 +276,9 @@ mod tests {
     #[test]
     fn what_is_no_capture_says_so() {
         let visit = |_, _: Captured<'_>| Ok(());
-        assert_eq!(walk(b"no capture at all, is it", visit).unwrap().unwrap(), "byte 0: neither pcap nor pcapng");
+        assert_eq!(
+            walk(b"no capture at all, is it", visit).unwrap().unwrap(),
+            "byte 0: neither pcap nor pcapng"
+        );
     }
 }

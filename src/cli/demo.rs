@@ -128,7 +128,10 @@ fn table(list: &ObjectList) -> String {
 }
 
 fn row(object: &Object) -> String {
-    let size = format!("{:.1}x{:.1}x{:.1}", object.length, object.width, object.height);
+    let size = format!(
+        "{:.1}x{:.1}x{:.1}",
+        object.length, object.width, object.height
+    );
     format!(
         "{:>5} {:>7.1} {:>7.1} {:>6.1} {:>6.0} {:>14} {:>7}\n",
         object.object_id,

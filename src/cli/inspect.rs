@@ -88,7 +88,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     }
     for damage in &report.damage {
         let (path, problem) = (arguments.input.display(), &damage.problem);
-        eprintln!("kreisel: {path}: {problem}; {} bytes skipped", damage.skipped);
+        eprintln!(
+            "kreisel: {path}: {problem}; {} bytes skipped",
+            damage.skipped
+        );
     }
     if report.damage.is_empty() {
         Ok(Completion::Done)
@@ -124,8 +127,13 @@ fn inspect(bytes: &[u8]) -> Report {
     let times = || messages.values();
     let first = times().map(|message| message.first).min();
     let last = times().map(|message| message.last).max();
-    report.duration_s = first.zip(last).map_or(0.0, |(first, last)| (last - first).seconds());
-    report.messages = messages.into_values().map(MessageReport::finished).collect();
+    report.duration_s = first
+        .zip(last)
+        .map_or(0.0, |(first, last)| (last - first).seconds());
+    report.messages = messages
+        .into_values()
+        .map(MessageReport::finished)
+        .collect();
     report
 }
 
@@ -195,7 +203,10 @@ fn print(report: &Report) {
         "{} bytes, {} envelopes, {:.3} s",
         report.bytes, report.envelopes, report.duration_s
     );
-    println!("{:>6} {:>10} {:>7} {:>11} {:>8} {:>8}  message", "id", "sender", "count", "bytes", "Hz", "gap s");
+    println!(
+        "{:>6} {:>10} {:>7} {:>11} {:>8} {:>8}  message",
+        "id", "sender", "count", "bytes", "Hz", "gap s"
+    );
     for message in &report.messages {
         println!(
             "{:>6} {:>10} {:>7} {:>11} {:>8.2} {:>8.3}  {}",
@@ -220,15 +231,25 @@ fn print(report: &Report) {
             cloud.end_azimuth_deg,
             cloud.byte_order,
             cloud.intensity_bits,
-            cloud.refused.as_ref().map_or(String::new(), |why| format!("; refused: {why}")),
+            cloud
+                .refused
+                .as_ref()
+                .map_or(String::new(), |why| format!("; refused: {why}")),
         );
     }
     let more = report.point_clouds.len().saturating_sub(MOST_CLOUD_LINES);
-    let refused = report.point_clouds.iter().filter(|cloud| cloud.refused.is_some()).count();
+    let refused = report
+        .point_clouds
+        .iter()
+        .filter(|cloud| cloud.refused.is_some())
+        .count();
     if more > 0 {
         println!("and {more} more point clouds");
     }
     if !report.point_clouds.is_empty() {
-        println!("{} point clouds, {refused} refused", report.point_clouds.len());
+        println!(
+            "{} point clouds, {refused} refused",
+            report.point_clouds.len()
+        );
     }
 }

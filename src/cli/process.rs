@@ -59,7 +59,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
         pipeline: Pipeline::new(&configuration, arguments.id),
         output: Output::create_if(arguments.output.as_deref())?,
         objects: Output::create_if(arguments.objects.as_deref())?,
-        labels: arguments.labels.as_deref().map(LabelWriter::create).transpose()?,
+        labels: arguments
+            .labels
+            .as_deref()
+            .map(LabelWriter::create)
+            .transpose()?,
         frame: vec![],
         status_due: None,
         faults: Tally::default(),
@@ -161,7 +165,11 @@ impl Process<'_> {
             status.datagrams_damaged,
         );
         if self.faults.total() > 0 {
-            eprintln!("kreisel: {}: {}", self.arguments.input.display(), self.faults);
+            eprintln!(
+                "kreisel: {}: {}",
+                self.arguments.input.display(),
+                self.faults
+            );
         }
         let all_refused = status.revolutions_received > 0 && status.revolutions_published == 0;
         if damages > 0 || status.datagrams_damaged > 0 || all_refused {

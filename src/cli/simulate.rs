@@ -38,7 +38,13 @@ const LONGEST_S: f64 = 86_400.0;
 const ROTATION_HZ: f64 = 10.0;
 
 fn find(name: &str) -> Result<Scenario, String> {
-    let names = || scenario::all().iter().map(|s| s.name).collect::<Vec<_>>().join(", ");
+    let names = || {
+        scenario::all()
+            .iter()
+            .map(|s| s.name)
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
     scenario::find(name).ok_or_else(|| format!("there is no such scenario; there are: {}", names()))
 }
 
@@ -46,7 +52,9 @@ fn find(name: &str) -> Result<Scenario, String> {
 pub(super) fn duration(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds <= LONGEST_S => Ok(seconds),
-        _ => Err(format!("not a number of seconds above 0 and up to {LONGEST_S}")),
+        _ => Err(format!(
+            "not a number of seconds above 0 and up to {LONGEST_S}"
+        )),
     }
 }
 

@@ -449,7 +449,10 @@ mod tests {
         assert_eq!(refused(sender.send(0.1, 359.9, 1784)), "uneven_step");
         assert_eq!(refused(sender.send(0.1, 359.9, 1808)), "accepted");
         assert_eq!(refused(sender.send(0.0, 189.6, 1875)), "partial_revolution");
-        assert_eq!(refused(sender.send(187.4, 359.9, 1702)), "partial_revolution");
+        assert_eq!(
+            refused(sender.send(187.4, 359.9, 1702)),
+            "partial_revolution"
+        );
     }
 
     #[test]
@@ -463,8 +466,16 @@ mod tests {
 
     #[test]
     fn impossible_azimuths_are_refused() {
-        for (start, end) in [(f32::NAN, 1.0), (0.0, f32::INFINITY), (0.0, 1e9), (-10.0, 360.0)] {
-            assert_eq!(refused(Sender::new().send(start, end, 1800)), "impossible_azimuth");
+        for (start, end) in [
+            (f32::NAN, 1.0),
+            (0.0, f32::INFINITY),
+            (0.0, 1e9),
+            (-10.0, 360.0),
+        ] {
+            assert_eq!(
+                refused(Sender::new().send(start, end, 1800)),
+                "impossible_azimuth"
+            );
         }
     }
 
@@ -473,16 +484,31 @@ mod tests {
         let mut sender = Sender::new();
         let now = sender.micros;
         assert_eq!(refused(sender.send_at(now, 0.1, 359.9, 1800)), "accepted");
-        assert_eq!(refused(sender.send_at(now, 0.1, 359.9, 1800)), "out_of_order");
-        assert_eq!(refused(sender.send_at(now - 200_000, 0.1, 359.9, 1800)), "out_of_order");
-        assert_eq!(refused(sender.send_at(now - 8_000_000, 0.1, 359.9, 1800)), "accepted");
-        assert_eq!(refused(sender.send_at(now - 7_900_000, 0.1, 359.9, 1800)), "accepted");
+        assert_eq!(
+            refused(sender.send_at(now, 0.1, 359.9, 1800)),
+            "out_of_order"
+        );
+        assert_eq!(
+            refused(sender.send_at(now - 200_000, 0.1, 359.9, 1800)),
+            "out_of_order"
+        );
+        assert_eq!(
+            refused(sender.send_at(now - 8_000_000, 0.1, 359.9, 1800)),
+            "accepted"
+        );
+        assert_eq!(
+            refused(sender.send_at(now - 7_900_000, 0.1, 359.9, 1800)),
+            "accepted"
+        );
     }
 
     #[test]
     fn more_columns_than_the_array_has_are_refused() {
         assert_eq!(refused(Sender::new().send(0.1, 359.9, 2000)), "accepted");
-        assert_eq!(refused(Sender::new().send(0.1, 359.9, 2001)), "too_many_columns");
+        assert_eq!(
+            refused(Sender::new().send(0.1, 359.9, 2001)),
+            "too_many_columns"
+        );
     }
 
     #[test]
@@ -523,7 +549,10 @@ mod tests {
                 sample_time_stamp: TimeStamp::from(Time::from_micros(micros)),
                 ..Envelope::default()
             };
-            sender.intake.accept(&envelope, cloud, &sender.parameters).is_ok()
+            sender
+                .intake
+                .accept(&envelope, cloud, &sender.parameters)
+                .is_ok()
         };
         assert!(send(3, 1_000_000));
         assert!(!send(4, 1_050_000));

@@ -226,7 +226,10 @@ pub(crate) mod tests {
             .flat_map(|point| distance_cm(point / MAX_LAYERS, point % MAX_LAYERS).to_be_bytes())
             .collect();
         let mut scan = Scan::default();
-        scan.fill(&revolution(&distances), &CloudParameters::profile(Profile::Default));
+        scan.fill(
+            &revolution(&distances),
+            &CloudParameters::profile(Profile::Default),
+        );
         scan
     }
 
@@ -259,7 +262,10 @@ pub(crate) mod tests {
         let close = |point: usize, expected: [f64; 3]| {
             let found = scan.point_m(point);
             for (found, expected) in found.iter().zip(expected) {
-                assert!((f64::from(*found) - expected).abs() < 1e-4, "{found} {expected}");
+                assert!(
+                    (f64::from(*found) - expected).abs() < 1e-4,
+                    "{found} {expected}"
+                );
             }
         };
         let (sine, cosine) = libm::sincos(15f64.to_radians());
@@ -288,7 +294,9 @@ pub(crate) mod tests {
         (parameters.vehicle_y_low_m, parameters.vehicle_y_high_m) = (-1.0, 1.0);
         let mut scan = Scan::default();
         scan.fill(&revolution(&distances), &parameters);
-        let ranges: Vec<f32> = (0..4).map(|column| scan.range_m()[scan.index(column, 8)]).collect();
+        let ranges: Vec<f32> = (0..4)
+            .map(|column| scan.range_m()[scan.index(column, 8)])
+            .collect();
         assert_eq!(ranges, [0.0, MASKED, 1.0, MASKED]);
         assert_eq!(scan.returns(), 16);
     }
@@ -297,7 +305,10 @@ pub(crate) mod tests {
     fn a_smaller_revolution_leaves_nothing_of_a_larger_one() {
         let mut scan = scan_of(2000, |_, _| 5000);
         let distances = vec![0; 10 * 32];
-        scan.fill(&revolution(&distances), &CloudParameters::profile(Profile::Default));
+        scan.fill(
+            &revolution(&distances),
+            &CloudParameters::profile(Profile::Default),
+        );
         assert_eq!((scan.len(), scan.returns()), (160, 0));
     }
 }

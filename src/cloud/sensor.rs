@@ -96,7 +96,11 @@ mod tests {
     #[test]
     fn the_parts_of_a_32_layer_sensor_are_32_different_rising_elevations() {
         for parts in [&HDL32E, &VLP32C] {
-            let mut all: Vec<f64> = parts.iter().flat_map(|part| part.elevation_deg).copied().collect();
+            let mut all: Vec<f64> = parts
+                .iter()
+                .flat_map(|part| part.elevation_deg)
+                .copied()
+                .collect();
             assert!(parts.iter().all(|part| part.elevation_deg.is_sorted()));
             all.sort_by(f64::total_cmp);
             all.dedup();

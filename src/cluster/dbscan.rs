@@ -177,7 +177,11 @@ impl Dbscan {
         labels.clear();
         labels.resize(scan.len(), Clusters::NONE);
         let mut clusters = 0;
-        for point in self.candidates.iter().filter(|point| self.core[**point as usize]) {
+        for point in self
+            .candidates
+            .iter()
+            .filter(|point| self.core[**point as usize])
+        {
             let number = &mut self.numbers[self.partition.find(*point) as usize];
             if *number == Clusters::NONE {
                 *number = clusters;
@@ -289,7 +293,8 @@ impl Row {
 
 /// All layers, beginning with one and going outward.
 fn nearest_first(layer: usize) -> impl Iterator<Item = usize> {
-    let outward = (1..MAX_LAYERS).flat_map(move |step| [layer.checked_sub(step), Some(layer + step)]);
+    let outward =
+        (1..MAX_LAYERS).flat_map(move |step| [layer.checked_sub(step), Some(layer + step)]);
     std::iter::once(layer).chain(outward.flatten().filter(|layer| *layer < MAX_LAYERS))
 }
 
@@ -301,7 +306,9 @@ mod tests {
 
     fn cluster(scan: &Scan, profile: Profile) -> Clusters {
         let ground = vec![false; scan.len()];
-        Dbscan::new(&ClusterParameters::profile(profile)).process(scan, &ground).clone()
+        Dbscan::new(&ClusterParameters::profile(profile))
+            .process(scan, &ground)
+            .clone()
     }
 
     #[test]
@@ -312,7 +319,10 @@ mod tests {
             _ => 0,
         });
         let clusters = cluster(&scan, Profile::Default);
-        assert_eq!(clusters.iter().map(<[u32]>::len).collect::<Vec<_>>(), [50, 50]);
+        assert_eq!(
+            clusters.iter().map(<[u32]>::len).collect::<Vec<_>>(),
+            [50, 50]
+        );
         assert_eq!(clusters.labels()[scan.index(900, 3)], Clusters::NONE);
         assert_eq!(clusters.labels()[scan.index(205, 6)], 1);
         assert!(clusters.points(1).is_sorted());
@@ -332,7 +342,9 @@ mod tests {
     #[test]
     fn ground_is_not_clustered() {
         let scan = scan_of(1800, |_, _| 1000);
-        let ground: Vec<bool> = (0..scan.len()).map(|point| scan.column(point) > 50).collect();
+        let ground: Vec<bool> = (0..scan.len())
+            .map(|point| scan.column(point) > 50)
+            .collect();
         let mut dbscan = Dbscan::new(&ClusterParameters::profile(Profile::Default));
         let clusters = dbscan.process(&scan, &ground);
         assert_eq!(clusters.len(), 1);

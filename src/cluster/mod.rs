@@ -56,7 +56,9 @@ impl ClusterParameters {
     /// Neighbours that make a return at a range a core point.
     fn min_points(&self, range_m: f32) -> u32 {
         let scaled = self.min_points as f32 * self.min_points_range_m as f32 / range_m;
-        let bounded = scaled.min(self.min_points as f32).max(self.min_points_far as f32);
+        let bounded = scaled
+            .min(self.min_points as f32)
+            .max(self.min_points_far as f32);
         // Rounded half up, in integers only.
         (bounded + 0.5) as u32
     }

@@ -86,12 +86,7 @@ impl Windows {
 
     /// The columns from `reach` before to `after` behind a column, over the seam at 0: at
     /// most two stretches, the second one often empty.
-    pub(super) fn stretches(
-        &self,
-        column: usize,
-        reach: usize,
-        after: usize,
-    ) -> [Range<usize>; 2] {
+    pub(super) fn stretches(&self, column: usize, reach: usize, after: usize) -> [Range<usize>; 2] {
         let columns = self.columns;
         if reach + after + 1 >= columns {
             return [0..columns, 0..0];
@@ -143,7 +138,9 @@ mod tests {
     #[test]
     fn the_thesis_looks_at_eighty_candidates() {
         let windows = windows(1800, Profile::Thesis);
-        let reaches: Vec<_> = (0..16).map(|other| windows.reach(3, other, 20.0, 1.8)).collect();
+        let reaches: Vec<_> = (0..16)
+            .map(|other| windows.reach(3, other, 20.0, 1.8))
+            .collect();
         assert_eq!(reaches, [Some(2); 16]);
         assert_eq!(windows.stretches(100, 2, 2)[0].len() * 16, 80);
     }

@@ -46,7 +46,10 @@ pub enum ConfigError {
 /// The whole configuration as TOML; [`parse`] gives it back.
 pub fn print(configuration: &Configuration) -> String {
     let mut out = String::new();
-    let _ = writeln!(out, "# Where values come from that are not given here: default, thesis.");
+    let _ = writeln!(
+        out,
+        "# Where values come from that are not given here: default, thesis."
+    );
     let _ = writeln!(out, "profile = \"{}\"", configuration.profile.name());
     for section in configuration.sections() {
         let _ = writeln!(out);
@@ -209,15 +212,25 @@ mod tests {
             "line 2: session.ttl: -1 is outside 0 to 255 hops"
         );
         let error = parse("[session]\nreceive_buffer_mb = nan\n").unwrap_err();
-        assert!(error.to_string().starts_with("line 2: session.receive_buffer_mb: \"nan\""));
+        assert!(
+            error
+                .to_string()
+                .starts_with("line 2: session.receive_buffer_mb: \"nan\"")
+        );
     }
 
     #[test]
     fn unknown_names_are_answered_with_the_known_ones() {
         let error = parse("\n[sesion]\nttl = 1\n").unwrap_err().to_string();
-        assert!(error.starts_with("line 2: there is no section \"sesion\""), "{error}");
+        assert!(
+            error.starts_with("line 2: there is no section \"sesion\""),
+            "{error}"
+        );
         let error = parse("[session]\nhops = 1\n").unwrap_err().to_string();
-        assert!(error.contains("there is no parameter \"session.hops\"; there are ttl"), "{error}");
+        assert!(
+            error.contains("there is no parameter \"session.hops\"; there are ttl"),
+            "{error}"
+        );
         let error = parse("profile = \"fast\"").unwrap_err().to_string();
         assert!(error.contains("there is no profile \"fast\""), "{error}");
     }

@@ -22,7 +22,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use tokio::time::{MissedTickBehavior, interval};
-use tracing::{debug, info};
+use tracing::{debug, info, warn};
 
 use crate::config::Configuration;
 use crate::pipeline::Pipeline;
@@ -49,6 +49,9 @@ pub struct Options {
 /// How often Status is sent.
 const STATUS_PERIOD: Duration = Duration::from_secs(1);
 
+/// A shorter receive buffer is worth a warning.
+const COMFORTABLE_BUFFER_S: f64 = 2.0;
+
 /// Counters of the receiving side, which Status shows.
 #[derive(Debug, Clone, Default)]
 struct Intake {
@@ -74,6 +77,12 @@ pub async fn run(options: Options, stop: impl Future<Output = ()>) -> Result<(),
         receiver.buffer_bytes() / 1000,
         receiver.buffer_seconds(),
     );
+    if receiver.buffer_seconds() < COMFORTABLE_BUFFER_S {
+        warn!(
+            "the kernel limits the receive buffer: raise net.core.rmem_max, or give the process \
+             CAP_NET_ADMIN, or revolutions are lost when this computer is busy"
+        );
+    }
     let vitals = Arc::new(Vitals::default());
     let health = health::serve(options.session.cid, Arc::clone(&vitals));
     let queue = Arc::new(Queue::new(parameters.queue_revolutions));
@@ -129,7 +138,9 @@ async fn receive(
         if arrival.kernel_dropped > intake.kernel_dropped {
             let lost = arrival.kernel_dropped - intake.kernel_dropped;
             intake.kernel_dropped = arrival.kernel_dropped;
-            log.note("kernel_dropped", || format!("{lost} datagrams: the receive buffer was full"));
+            log.note("kernel_dropped", || {
+                format!("{lost} datagrams: the receive buffer was full")
+            });
         }
         if arrival.is_own {
             intake.own += 1;
@@ -154,11 +165,17 @@ fn sorted(
             if rest > 0 {
                 intake.faults.count("trailing_bytes");
                 log.note("trailing_bytes", || {
-                    format!("{rest} bytes after the envelope from {} not read", arrival.source)
+                    format!(
+                        "{rest} bytes after the envelope from {} not read",
+                        arrival.source
+                    )
                 });
             }
             if !Pipeline::concerns(envelope.data_type) {
-                debug!("message {} from {} passed over", envelope.data_type, arrival.source);
+                debug!(
+                    "message {} from {} passed over",
+                    envelope.data_type, arrival.source
+                );
                 return None;
             }
             Some(Item::Job(Job {
@@ -170,7 +187,9 @@ fn sorted(
         Err(error) => {
             intake.damaged += 1;
             intake.faults.count(error.name());
-            log.note(error.name(), || format!("datagram from {}: {error}", arrival.source));
+            log.note(error.name(), || {
+                format!("datagram from {}: {error}", arrival.source)
+            });
             None
         }
     }

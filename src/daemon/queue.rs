@@ -133,7 +133,12 @@ mod tests {
     #[test]
     fn the_oldest_revolution_goes_and_poses_stay() {
         let queue = Queue::new(2);
-        for item in [job("a", true), job("pose", false), job("b", true), job("c", true)] {
+        for item in [
+            job("a", true),
+            job("pose", false),
+            job("b", true),
+            job("c", true),
+        ] {
             queue.push(item);
         }
         assert_eq!(queue.dropped(), (1, 0));

@@ -93,7 +93,10 @@ fn slice_of(scan: &Scan, column: usize, segments: usize) -> usize {
 /// Keeps the lowest `capacity`, lowest first; of equal ones the first to come.
 fn insert(minima: &mut Vec<Minimum>, capacity: usize, minimum: Minimum) {
     if minima.len() == capacity {
-        if minima.last().is_none_or(|highest| minimum.above_m >= highest.above_m) {
+        if minima
+            .last()
+            .is_none_or(|highest| minimum.above_m >= highest.above_m)
+        {
             return;
         }
         minima.pop();
@@ -123,8 +126,12 @@ mod tests {
         minima.gather(&scan, &Plane::level(0.0), 25.0);
         assert_eq!(minima.len(), 18 * 10);
         let lowest = |segment| {
-            let of_slice = (0..minima.len()).map(|n| minima.get(n)).filter(|(s, _)| *s == segment);
-            of_slice.map(|(_, point)| point.z).fold(f64::INFINITY, f64::min)
+            let of_slice = (0..minima.len())
+                .map(|n| minima.get(n))
+                .filter(|(s, _)| *s == segment);
+            of_slice
+                .map(|(_, point)| point.z)
+                .fold(f64::INFINITY, f64::min)
         };
         let expected = -5.99 * 15f64.to_radians().sin();
         assert!((lowest(9) - expected).abs() < 1e-4);

@@ -142,7 +142,8 @@ impl Ground {
     pub fn process(&mut self, scan: &Scan) -> GroundReport {
         let followed = self.last.filter(|_| self.parameters.follow);
         let reference = followed.unwrap_or(Plane::level(0.0));
-        self.minima.gather(scan, &reference, self.parameters.candidate_range_m);
+        self.minima
+            .gather(scan, &reference, self.parameters.candidate_range_m);
         let mut random = Random::new(self.parameters.seed as u64 ^ self.revolutions << 20);
         let near = followed.filter(|_| self.misses < self.parameters.follow_patience);
         let found = ransac::find(&self.minima, near.as_ref(), &self.parameters, &mut random);
@@ -162,7 +163,9 @@ impl Ground {
             plane,
             origin,
             candidates: self.minima.len(),
-            support: self.minima.support(&plane, self.parameters.inlier_distance_m),
+            support: self
+                .minima
+                .support(&plane, self.parameters.inlier_distance_m),
             points: self.mark(scan, &plane),
         }
     }
@@ -201,7 +204,11 @@ mod tests {
             let descent = -(elevation.sin() * cosine + elevation.cos() * azimuth.cos() * sine);
             let wall = column % 180 < 30 && layer > 4;
             let range = if wall { 8.0 } else { height_m / descent };
-            if (1.0..100.0).contains(&range) { (range * 100.0).round() as u16 } else { 0 }
+            if (1.0..100.0).contains(&range) {
+                (range * 100.0).round() as u16
+            } else {
+                0
+            }
         })
     }
 
@@ -214,14 +221,20 @@ mod tests {
         for (height_m, tilt_deg) in [(0.8, 0.0), (1.6, 3.0), (2.05, -2.0), (3.2, 5.0)] {
             let report = process(&tilted_road(height_m, tilt_deg), Profile::Default);
             assert_eq!(report.origin, Origin::Found);
-            assert!((report.plane.height_m() - height_m).abs() < 0.03, "{report:?}");
+            assert!(
+                (report.plane.height_m() - height_m).abs() < 0.03,
+                "{report:?}"
+            );
             assert!((report.plane.tilt_rad().to_degrees() - tilt_deg.abs()).abs() < 0.3);
         }
     }
 
     #[test]
     fn the_thesis_gate_holds_for_one_car_only() {
-        assert_eq!(process(&tilted_road(2.05, 0.0), Profile::Thesis).origin, Origin::Found);
+        assert_eq!(
+            process(&tilted_road(2.05, 0.0), Profile::Thesis).origin,
+            Origin::Found
+        );
         let report = process(&tilted_road(1.6, 0.0), Profile::Thesis);
         assert_eq!(report.origin, Origin::Fallback);
         assert_eq!(report.plane.height_m(), 2.05);
@@ -240,7 +253,10 @@ mod tests {
     fn a_nod_is_followed_and_a_leap_is_not_until_patience_ends() {
         let mut ground = Ground::new(&GroundParameters::profile(Profile::Default));
         ground.process(&tilted_road(1.6, 0.0));
-        assert_eq!(ground.process(&tilted_road(1.65, 2.0)).origin, Origin::Found);
+        assert_eq!(
+            ground.process(&tilted_road(1.65, 2.0)).origin,
+            Origin::Found
+        );
         let leap = tilted_road(2.6, 2.0);
         let origins: Vec<_> = (0..11).map(|_| ground.process(&leap).origin).collect();
         assert_eq!(origins[..10], [Origin::Held; 10]);
@@ -252,7 +268,10 @@ mod tests {
         let scan = tilted_road(1.6, 2.0);
         let mut ground = Ground::new(&GroundParameters::profile(Profile::Default));
         let report = ground.process(&scan);
-        assert_eq!(report.points, ground.mask().iter().filter(|mark| **mark).count());
+        assert_eq!(
+            report.points,
+            ground.mask().iter().filter(|mark| **mark).count()
+        );
         assert!(ground.mask()[scan.index(100, 2)]);
         assert!(!ground.mask()[scan.index(10, 9)]);
         // No return is no ground.
@@ -262,6 +281,9 @@ mod tests {
     #[test]
     fn the_same_seed_gives_the_same_plane() {
         let scan = tilted_road(1.9, 1.0);
-        assert_eq!(process(&scan, Profile::Default), process(&scan, Profile::Default));
+        assert_eq!(
+            process(&scan, Profile::Default),
+            process(&scan, Profile::Default)
+        );
     }
 }

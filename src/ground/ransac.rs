@@ -38,14 +38,11 @@ pub(super) fn find(
 }
 
 /// A plane through three returns, refined by all that lie close to it.
-fn candidate(
-    minima: &Minima,
-    parameters: &GroundParameters,
-    random: &mut Random,
-) -> Option<Plane> {
+fn candidate(minima: &Minima, parameters: &GroundParameters, random: &mut Random) -> Option<Plane> {
     let [a, b, c] = draw(minima, random)?;
     let drawn = Plane::through(a, b, c)?;
-    let supports = |point: &Vector3<f64>| drawn.above_m(point).abs() <= parameters.inlier_distance_m;
+    let supports =
+        |point: &Vector3<f64>| drawn.above_m(point).abs() <= parameters.inlier_distance_m;
     let support = minima.points().filter(supports);
     let needed = (parameters.least_support * minima.len() as f64).max(3.0);
     if (support.clone().count() as f64) < needed {

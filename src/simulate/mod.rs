@@ -204,7 +204,11 @@ mod tests {
         let (out, truth) = revolutions(1, 3);
         let (envelope, _) = Envelope::from_datagram(&out).unwrap();
         let cloud = CompactPointCloud::decode(envelope.payload, 0).unwrap();
-        assert!((1808..=1809).contains(&cloud.columns()), "{}", cloud.columns());
+        assert!(
+            (1808..=1809).contains(&cloud.columns()),
+            "{}",
+            cloud.columns()
+        );
         assert!(cloud.end_azimuth_deg > 359.7);
         let between_s = (truth[2].time - truth[1].time).seconds();
         assert!((between_s - 0.1).abs() < 1e-4);

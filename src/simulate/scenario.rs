@@ -163,7 +163,7 @@ fn roundabout() -> Scenario {
             actor(Class::Car, 12.0, 200.0, 8.0),
             actor(Class::Car, 12.0, 320.0, 8.0),
             actor(Class::Car, 12.0, 80.0, 8.0),
-            actor(Class::Cyclist, 16.5, 10.0, 4.17),
+            actor(Class::Cyclist, 16.0, 10.0, 4.17),
             actor(Class::Pedestrian, 20.5, 305.0, -1.39),
         ],
         statics: vec![
@@ -289,7 +289,10 @@ mod tests {
     #[test]
     fn names_find_their_scenarios() {
         for scenario in all() {
-            assert_eq!(find(scenario.name).map(|found| found.name), Some(scenario.name));
+            assert_eq!(
+                find(scenario.name).map(|found| found.name),
+                Some(scenario.name)
+            );
         }
         assert!(find("nowhere").is_none());
     }

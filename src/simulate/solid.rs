@@ -91,7 +91,11 @@ impl Solid {
 fn slab(start: f64, rate: f64, low: f64, high: f64) -> (f64, f64) {
     if rate.abs() < 1e-12 {
         let inside = (low..=high).contains(&start);
-        return if inside { (f64::MIN, f64::MAX) } else { NOWHERE };
+        return if inside {
+            (f64::MIN, f64::MAX)
+        } else {
+            NOWHERE
+        };
     }
     let (a, b) = ((low - start) / rate, (high - start) / rate);
     (a.min(b), a.max(b))

@@ -71,7 +71,11 @@ impl Identities {
     fn move_known(&mut self, now: Time, velocity: impl Fn(u32) -> [f64; 2], predict: bool) {
         self.moved.clear();
         self.moved.extend(self.known.iter().map(|known| {
-            let [vx, vy] = if predict { velocity(known.id) } else { [0.0; 2] };
+            let [vx, vy] = if predict {
+                velocity(known.id)
+            } else {
+                [0.0; 2]
+            };
             let passed_s = (now - known.time).seconds();
             [
                 known.centre_m[0] + vx * passed_s,
@@ -148,7 +152,9 @@ mod tests {
             let now = Time::from_micros(self.micros);
             let still = |_| [0.0; 2];
             let nobody = |_: &[f64; 2]| None;
-            self.identities.assign(centres_m, now, still, nobody, &self.parameters).to_vec()
+            self.identities
+                .assign(centres_m, now, still, nobody, &self.parameters)
+                .to_vec()
         }
     }
 
@@ -156,7 +162,10 @@ mod tests {
     fn ids_ascend_and_stay_with_the_nearest_within_three_metres() {
         let mut scene = Scene::new(Profile::Thesis);
         assert_eq!(scene.assign(&[[0.0, 0.0], [10.0, 0.0]]), [0, 1]);
-        assert_eq!(scene.assign(&[[10.5, 0.0], [1.0, 0.0], [20.0, 0.0]]), [1, 0, 2]);
+        assert_eq!(
+            scene.assign(&[[10.5, 0.0], [1.0, 0.0], [20.0, 0.0]]),
+            [1, 0, 2]
+        );
         assert_eq!(scene.assign(&[[4.1, 0.0]]), [3]);
     }
 
@@ -189,8 +198,14 @@ mod tests {
         let at = |tenths: i64| Time::from_micros(tenths * 100_000);
         let along_x = |_| [10.0, 0.0];
         let nobody = |_: &[f64; 2]| None;
-        assert_eq!(identities.assign(&[[0.0, 0.0]], at(0), along_x, nobody, &parameters), [0]);
+        assert_eq!(
+            identities.assign(&[[0.0, 0.0]], at(0), along_x, nobody, &parameters),
+            [0]
+        );
         // Half a second unseen: five metres on.
-        assert_eq!(identities.assign(&[[5.0, 0.0]], at(5), along_x, nobody, &parameters), [0]);
+        assert_eq!(
+            identities.assign(&[[5.0, 0.0]], at(5), along_x, nobody, &parameters),
+            [0]
+        );
     }
 }

@@ -17,7 +17,7 @@ use crate::config::parameters;
 use crate::ground::Plane;
 use crate::time::Time;
 use identity::Identities;
-use motion::{Motion, Velocity};
+use motion::Motion;
 
 parameters! {
     /// The tracks: identities, boxes, velocities.
@@ -61,8 +61,6 @@ const CABIN_FLOOR_M: f64 = 0.45;
 const CABIN_ROOF_M: f64 = 0.95;
 /// Margin around a predicted box within which a cluster is a piece of it.
 const PIECE_MARGIN_M: f64 = 0.8;
-/// Above this speed an object moves along its length.
-const MOVING_MPS: f64 = 0.8;
 /// Standard deviation of where the middle of a cluster is seen.
 const CENTRE_DEVIATION_M: f64 = 0.1;
 /// Of a speed that was not measured yet: it may be any in a town.
@@ -206,19 +204,26 @@ impl Tracker {
         let objects = parameters.complete_boxes.then_some(&self.objects[..]);
         let boxes = objects.unwrap_or(&[]).iter().map(|object| {
             let passed_s = (now - self.objects_time).seconds();
-            (object.id, object.rectangle().moved(object.velocity_mps(), passed_s))
+            (
+                object.id,
+                object.rectangle().moved(object.velocity_mps(), passed_s),
+            )
         });
         let boxes: Vec<(u32, Rectangle)> = boxes.collect();
         let owner = |centre_m: &[f64; 2]| {
-            let around = |(_, rectangle): &&(u32, Rectangle)| rectangle.contains(centre_m, PIECE_MARGIN_M);
+            let around =
+                |(_, rectangle): &&(u32, Rectangle)| rectangle.contains(centre_m, PIECE_MARGIN_M);
             boxes.iter().find(around).map(|(id, _)| *id)
         };
-        let ids = self.identities.assign(&centres, now, velocity, owner, parameters);
+        let ids = self
+            .identities
+            .assign(&centres, now, velocity, owner, parameters);
         for (seen, id) in self.seen.iter_mut().zip(ids) {
             seen.id = *id;
         }
         self.seen.sort_by_key(|seen| (seen.id, seen.cluster));
-        self.motions.retain(|motion| self.identities.knows(motion.id()));
+        self.motions
+            .retain(|motion| self.identities.knows(motion.id()));
         self.objects_time = now;
     }
 
@@ -232,7 +237,7 @@ impl Tracker {
         let points = || pieces.iter().flat_map(|seen| clusters.points(seen.cluster));
         let count = points().count();
         let motion = self.follow(pieces, clusters);
-        let velocity = motion.velocity();
+        let (velocity, heading_rad) = (motion.velocity(), motion.heading_rad());
         let (first_seen, existence) = (motion.first_seen(), motion.existence());
 
         self.outline.clear();
@@ -244,8 +249,6 @@ impl Tracker {
             self.outline.push([position[0], position[1]]);
         }
         let [vx, vy] = velocity.mps;
-        let moving = velocity.known && velocity.speed_mps() > MOVING_MPS;
-        let heading_rad = moving.then(|| libm::atan2(vy, vx));
         let measured = Rectangle::fit(&self.outline, heading_rad);
         let mut rectangle = measured;
         if self.parameters.complete_boxes && VEHICLE_HEIGHT_M.contains(&height_m) {
@@ -268,7 +271,7 @@ impl Tracker {
             width_m: rectangle.width_m,
             height_m,
             position_deviation_m: CENTRE_DEVIATION_M + 0.25 * added_m.max(0.0),
-            yaw_deviation_rad: rectangle.yaw_deviation_rad(moving),
+            yaw_deviation_rad: rectangle.yaw_deviation_rad(heading_rad.is_some()),
             speed_deviation_mps: velocity.deviation_mps,
             existence,
             first_seen,
@@ -281,7 +284,10 @@ impl Tracker {
         let weight = |seen: &Seen| clusters.points(seen.cluster).len() as f64;
         let total: f64 = pieces.iter().map(weight).sum();
         let centre_m = [0, 1].map(|axis| {
-            let sum: f64 = pieces.iter().map(|seen| weight(seen) * seen.centre_m[axis]).sum();
+            let sum: f64 = pieces
+                .iter()
+                .map(|seen| weight(seen) * seen.centre_m[axis])
+                .sum();
             sum / total
         });
         let id = pieces[0].id;
@@ -356,7 +362,11 @@ fn completed(seen: Rectangle, heading_rad: Option<f64>, is_cabin: bool) -> Recta
     let is_wide = |across_m: f64| VEHICLE_WIDTH_M.contains(&across_m);
     let to_car = |seen: Rectangle| {
         let car = seen.grown(CAR_LENGTH_M, CAR_WIDTH_M);
-        let centre_m = if is_cabin { seen.centre_m } else { car.centre_m };
+        let centre_m = if is_cabin {
+            seen.centre_m
+        } else {
+            car.centre_m
+        };
         Rectangle { centre_m, ..car }
     };
     if heading_rad.is_some() {
@@ -373,13 +383,6 @@ fn completed(seen: Rectangle, heading_rad: Option<f64>, is_cabin: bool) -> Recta
         to_car(seen.quarter_turned())
     } else {
         seen
-    }
-}
-
-impl Velocity {
-    fn speed_mps(&self) -> f64 {
-        let [x, y] = self.mps;
-        libm::sqrt(x * x + y * y)
     }
 }
 
@@ -422,8 +425,14 @@ mod tests {
             panic!("{objects:?}")
         };
         assert!(car.centre_m[0].abs() < 0.1, "{car:?}");
-        assert!((car.centre_m[1] - 10.0 - CAR_LENGTH_M / 2.0).abs() < 0.1, "{car:?}");
-        assert!((car.length_m, car.width_m) == (CAR_LENGTH_M, CAR_WIDTH_M), "{car:?}");
+        assert!(
+            (car.centre_m[1] - 10.0 - CAR_LENGTH_M / 2.0).abs() < 0.1,
+            "{car:?}"
+        );
+        assert!(
+            (car.length_m, car.width_m) == (CAR_LENGTH_M, CAR_WIDTH_M),
+            "{car:?}"
+        );
     }
 
     #[test]
@@ -438,7 +447,10 @@ mod tests {
         let mut tracker = Tracker::new(&TrackParameters::profile(Profile::Default));
         for _ in 0..5 {
             let objects = track(&mut tracker, &rear_of_car(12.0));
-            assert_eq!(objects.iter().map(|object| object.id).collect::<Vec<_>>(), [0]);
+            assert_eq!(
+                objects.iter().map(|object| object.id).collect::<Vec<_>>(),
+                [0]
+            );
             assert!(objects[0].speed_mps.abs() < 0.01);
         }
     }

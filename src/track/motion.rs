@@ -3,6 +3,11 @@
 use super::{CENTRE_DEVIATION_M, UNKNOWN_SPEED_DEVIATION_MPS};
 use crate::time::Time;
 
+/// Above this speed an object moves along its length.
+const MOVING_MPS: f64 = 0.8;
+/// Travel that shows a direction: noise of 0.1 m turns it by 5 degrees.
+const TRAVEL_M: f64 = 1.5;
+
 /// Where an object was seen lately.
 #[derive(Debug, Clone)]
 pub(super) struct Motion {
@@ -50,6 +55,26 @@ impl Motion {
 
     pub(super) fn velocity(&self) -> Velocity {
         self.velocity
+    }
+
+    /// Direction of motion, if it moves: that of the latest travel long enough to show one. A
+    /// longer travel would lag behind in a bend.
+    pub(super) fn heading_rad(&self) -> Option<f64> {
+        let (_, [x, y]) = self.positions.last()?;
+        let [vx, vy] = self.velocity.mps;
+        if !self.velocity.known || libm::hypot(vx, vy) <= MOVING_MPS {
+            return None;
+        }
+        let travels = self
+            .positions
+            .iter()
+            .rev()
+            .map(|(_, then)| [x - then[0], y - then[1]]);
+        let long = travels
+            .into_iter()
+            .find(|[dx, dy]| libm::hypot(*dx, *dy) >= TRAVEL_M);
+        let [dx, dy] = long.unwrap_or([vx, vy]);
+        Some(libm::atan2(dy, dx))
     }
 
     /// Probability that the object exists: half of all single clusters are noise, and each

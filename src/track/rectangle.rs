@@ -63,7 +63,11 @@ impl Rectangle {
     pub fn quarter_turned(self) -> Self {
         let yaw_rad = self.yaw_rad + FRAC_PI_2;
         Self {
-            yaw_rad: if yaw_rad > PI { yaw_rad - 2.0 * PI } else { yaw_rad },
+            yaw_rad: if yaw_rad > PI {
+                yaw_rad - 2.0 * PI
+            } else {
+                yaw_rad
+            },
             length_m: self.width_m,
             width_m: self.length_m,
             ..self

@@ -87,7 +87,13 @@ mod tests {
 
     #[test]
     fn anything_else_is_no_frame() {
-        assert_eq!(split(&[0x0d, 0xa5], 0), Err(WireError::BadMagic { offset: 0 }));
-        assert_eq!(split(&[7, 0, 0, 0, 0, 0], 0), Err(WireError::BadMagic { offset: 0 }));
+        assert_eq!(
+            split(&[0x0d, 0xa5], 0),
+            Err(WireError::BadMagic { offset: 0 })
+        );
+        assert_eq!(
+            split(&[7, 0, 0, 0, 0, 0], 0),
+            Err(WireError::BadMagic { offset: 0 })
+        );
     }
 }

@@ -2,9 +2,7 @@
 //! that is compared with `proto/kreisel.odvd` all follow.
 
 use super::WireError;
-use super::protobuf::{
-    Reader, Value, put_key, put_length_delimited, put_varint, unzigzag, zigzag,
-};
+use super::protobuf::{Reader, Value, put_key, put_length_delimited, put_varint, unzigzag, zigzag};
 
 /// A message with a number of its own.
 pub trait Message: Default {

@@ -281,7 +281,9 @@ impl<'a> CompactPointCloud<'a> {
             .map(|(left, right)| (distance(left), distance(right)))
             .filter(|(left, right)| *left != 0 && *right != 0)
             .map(|(left, right)| u64::from(left.abs_diff(right)))
-            .fold((0, 0), |(sum, pairs), difference| (sum + difference, pairs + 1))
+            .fold((0, 0), |(sum, pairs), difference| {
+                (sum + difference, pairs + 1)
+            })
     }
 }
 
@@ -406,6 +408,9 @@ mod tests {
             layers: 0,
             ..cloud(&[1, 2, 3, 4])
         };
-        assert_eq!((message.columns(), message.roughness(ByteOrder::Big)), (0, 0));
+        assert_eq!(
+            (message.columns(), message.roughness(ByteOrder::Big)),
+            (0, 0)
+        );
     }
 }

@@ -163,7 +163,10 @@ mod tests {
         let closed = assembler.take(&packet(35_900)).unwrap();
         let cloud = closed[0].cloud();
         assert_eq!((closed.len(), cloud.columns()), (1, 24 + 6));
-        assert_eq!((cloud.start_azimuth_deg, cloud.end_azimuth_deg), (0.0, 360.0));
+        assert_eq!(
+            (cloud.start_azimuth_deg, cloud.end_azimuth_deg),
+            (0.0, 360.0)
+        );
         assert_eq!(assembler.pending_columns(), 18);
     }
 
@@ -172,7 +175,10 @@ mod tests {
         let mut assembler = SweepAssembler::default();
         assembler.take(&packet(0)).unwrap();
         let column = &assembler.distances[..32];
-        let found: Vec<u16> = column.chunks(2).map(|two| u16::from_be_bytes([two[0], two[1]])).collect();
+        let found: Vec<u16> = column
+            .chunks(2)
+            .map(|two| u16::from_be_bytes([two[0], two[1]]))
+            .collect();
         assert_eq!(found[..4], [200, 202, 204, 206]);
         assert_eq!(found[8..11], [201, 203, 205]);
     }
@@ -180,7 +186,10 @@ mod tests {
     #[test]
     fn what_is_no_data_packet_is_named() {
         let mut assembler = SweepAssembler::default();
-        assert_eq!(assembler.take(&[0; 512]), Err(PacketError::Length { length: 512 }));
+        assert_eq!(
+            assembler.take(&[0; 512]),
+            Err(PacketError::Length { length: 512 })
+        );
         let mut broken = packet(0);
         broken[300] = 0;
         assert_eq!(assembler.take(&broken), Err(PacketError::Flag { block: 3 }));

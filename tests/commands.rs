@@ -1,0 +1,336 @@
+//! The offline commands as a user runs them: results, exit codes, and one clear line for
+//! everything that is wrong.
+#![cfg(feature = "shell")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use kreisel::wire::object_list::ObjectList;
+use kreisel::wire::status::Status;
+use kreisel::wire::{Envelope, Message, Recording};
+use serde_json::Value;
+
+fn kreisel<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_kreisel"));
+    command.args(arguments).output().unwrap()
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn text(&self, name: &str) -> String {
+        self.path(name).to_str().unwrap().into()
+    }
+
+    fn write(&self, name: &str, content: impl AsRef<[u8]>) -> String {
+        std::fs::write(self.path(name), content).unwrap();
+        self.text(name)
+    }
+}
+
+fn json_lines(path: &Path) -> Vec<Value> {
+    let text = std::fs::read_to_string(path).unwrap();
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+fn payloads(bytes: &[u8]) -> Vec<Envelope<'_>> {
+    Recording::new(bytes)
+        .map(|entry| entry.unwrap().envelope)
+        .collect()
+}
+
+#[test]
+fn every_complete_revolution_of_a_real_drive_gives_a_list_above_a_road_1_6_m_below() {
+    let Some(input) = common::data("vlp16-sampleShort.rec") else {
+        return;
+    };
+    let bytes = std::fs::read(&input).unwrap();
+    let mut pipeline = kreisel::pipeline::Pipeline::new(&Default::default(), 0);
+    let mut lists = 0;
+    for entry in Recording::new(&bytes) {
+        let Ok(kreisel::pipeline::Outcome::Revolution(report)) =
+            pipeline.handle(&entry.unwrap().envelope)
+        else {
+            continue;
+        };
+        let plane = report.ground.plane;
+        assert!((1.5..1.75).contains(&plane.height_m()), "{plane:?}");
+        assert!(plane.tilt_rad() < 0.05, "{plane:?}");
+        assert!(report.ground.points > 3000, "{report:?}");
+        lists += pipeline.publish(report.time, 0.0).count();
+    }
+    assert_eq!(lists, 3);
+}
+
+#[test]
+fn process_gives_the_same_bytes_twice_and_one_list_a_revolution() {
+    let folder = Folder::new();
+    let (recording, truth) = (folder.text("in.rec"), folder.text("truth.jsonl"));
+    let made = kreisel(&[
+        "simulate",
+        "roundabout",
+        "--seed",
+        "3",
+        "--duration",
+        "2.5",
+        "--output",
+        &recording,
+        "--truth",
+        &truth,
+    ]);
+    assert_eq!(code(&made), 0, "{}", stderr(&made));
+    let process = |n: usize| {
+        let name = |what: &str| folder.text(&format!("{n}.{what}"));
+        let arguments = [
+            "process",
+            &recording,
+            "--output",
+            &name("rec"),
+            "--objects",
+            &name("jsonl"),
+            "--labels",
+            &name("npz"),
+        ];
+        assert_eq!(code(&kreisel(&arguments)), 0);
+        ["rec", "jsonl", "npz"].map(|what| std::fs::read(name(what)).unwrap())
+    };
+    let (first, second) = (process(1), process(2));
+    assert!(first == second, "two runs differ");
+
+    let envelopes = payloads(&first[0]);
+    let lists: Vec<ObjectList> = envelopes
+        .iter()
+        .filter(|envelope| envelope.data_type == ObjectList::ID)
+        .map(|envelope| ObjectList::decode(envelope.payload, 0).unwrap())
+        .collect();
+    assert_eq!(
+        lists.iter().map(|list| list.revolution).collect::<Vec<_>>(),
+        (0..25).collect::<Vec<_>>()
+    );
+    assert!(
+        lists
+            .iter()
+            .all(|list| list.processing_time == 0.0 && list.count >= 4)
+    );
+    let statuses = envelopes
+        .iter()
+        .filter(|envelope| envelope.data_type == Status::ID)
+        .count();
+    assert_eq!(statuses, 2);
+
+    let objects = json_lines(&folder.path("1.jsonl"));
+    let truth = json_lines(&folder.path("truth.jsonl"));
+    for (line, was) in objects.iter().zip(&truth) {
+        assert_eq!(line["t"], was["t"]);
+        assert_eq!(line["ego"], Value::Null);
+    }
+}
+
+#[test]
+fn convert_gives_the_bytes_of_the_device_service() {
+    let (Some(capture), Some(golden)) = (
+        common::data("vlp16-sampleShort.pcap"),
+        common::data("vlp16-sampleShort-datagrams.rec"),
+    ) else {
+        return;
+    };
+    let folder = Folder::new();
+    let converted = kreisel(&[
+        "convert",
+        capture.to_str().unwrap(),
+        &folder.text("out.rec"),
+    ]);
+    assert_eq!(code(&converted), 3, "the capture's last record is cut off");
+    assert!(
+        stderr(&converted).contains("vlp16-sampleShort.pcap: byte 399768"),
+        "{}",
+        stderr(&converted)
+    );
+    let (ours, theirs) = (
+        std::fs::read(folder.path("out.rec")).unwrap(),
+        std::fs::read(golden).unwrap(),
+    );
+    let (ours, theirs) = (payloads(&ours), payloads(&theirs));
+    assert_eq!(ours.len(), 4);
+    for (ours, theirs) in ours.iter().zip(&theirs) {
+        assert!(ours.payload == theirs.payload);
+    }
+}
+
+#[test]
+fn captures_of_other_sensors_and_links_convert_too() {
+    for (name, columns) in [
+        ("vlp16-mrpt-indoor.pcap", 1811),
+        ("vlp16-lidar-utils-outdoor.pcap", 552),
+    ] {
+        let Some(capture) = common::data(name) else {
+            return;
+        };
+        let folder = Folder::new();
+        let converted = kreisel(&[
+            "convert",
+            capture.to_str().unwrap(),
+            &folder.text("out.rec"),
+        ]);
+        assert!([0, 3].contains(&code(&converted)), "{}", stderr(&converted));
+        let inspected = kreisel(&["inspect", "--json", &folder.text("out.rec")]);
+        let report: Value = serde_json::from_slice(&inspected.stdout).unwrap();
+        let clouds = report["point_clouds"].as_array().unwrap();
+        assert_eq!(clouds.last().unwrap()["columns"], columns);
+        assert_eq!(clouds.last().unwrap()["byte_order"], "big-endian");
+    }
+}
+
+#[test]
+fn inspect_says_what_the_array_cannot_hold() {
+    for (name, reason) in [
+        ("hdl32e-synthetic.rec", "12 of the 32 layers of a HDL-32E"),
+        ("vlp32c-synthetic.rec", "12 of the 32 layers of a VLP-32C"),
+        ("vlp16-synthetic-5hz.rec", "partial_revolution"),
+        ("vlp16-sampleShort.rec", "first_azimuth"),
+    ] {
+        let Some(path) = common::data(name) else {
+            return;
+        };
+        let inspected = kreisel(&["inspect", path.to_str().unwrap()]);
+        assert_eq!(code(&inspected), 0);
+        let text = String::from_utf8_lossy(&inspected.stdout).into_owned();
+        assert!(text.contains(reason), "{text}");
+        assert!(
+            text.contains("big-endian") || text.contains("undecided"),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn a_damaged_recording_is_processed_around_its_damage() {
+    let folder = Folder::new();
+    let recording = folder.text("in.rec");
+    kreisel(&[
+        "simulate",
+        "roundabout",
+        "--duration",
+        "0.5",
+        "--output",
+        &recording,
+    ]);
+    let mut bytes = std::fs::read(&recording).unwrap();
+    let second = Recording::new(&bytes).nth(1).unwrap().unwrap().offset;
+    bytes.splice(second..second, *b"noise");
+    bytes.truncate(bytes.len() - 100);
+    let damaged = folder.write("damaged.rec", &bytes);
+    let processed = kreisel(&["process", &damaged, "--objects", &folder.text("o.jsonl")]);
+    assert_eq!(code(&processed), 3);
+    assert!(
+        stderr(&processed).contains(&format!("damaged.rec: byte {second}: no frame begins here"))
+    );
+    assert_eq!(json_lines(&folder.path("o.jsonl")).len(), 4);
+}
+
+#[test]
+fn the_printed_configuration_can_be_fed_back() {
+    let folder = Folder::new();
+    let recording = folder.text("in.rec");
+    kreisel(&[
+        "simulate",
+        "roundabout",
+        "--duration",
+        "0.3",
+        "--output",
+        &recording,
+    ]);
+    for profile in ["default", "thesis"] {
+        let printed = kreisel(&["config", "--profile", profile]);
+        let file = folder.write("kreisel.toml", &printed.stdout);
+        let processed = kreisel(&["process", &recording, "--config", &file]);
+        assert_eq!(code(&processed), 0, "{}", stderr(&processed));
+    }
+}
+
+#[test]
+fn what_is_wrong_is_one_line_that_names_it() {
+    let folder = Folder::new();
+    let config = folder.write(
+        "k.toml",
+        "profile = \"default\"\n\n[ground]\niterations = 0\n",
+    );
+    let empty = folder.write("empty.rec", "");
+    let noise = folder.write("noise.pcap", "this is no capture at all");
+    let cases: [(&[&str], &str); 6] = [
+        (
+            &["process", "/no/such.rec"],
+            "kreisel: /no/such.rec: No such file",
+        ),
+        (
+            &["process", &empty, "--config", &config],
+            "k.toml: line 4: ground.iterations: 0 is outside 1 to 1000",
+        ),
+        (
+            &["process", &empty, "--output", "/no/dir/out.rec"],
+            "kreisel: /no/dir/out.rec: No such file",
+        ),
+        (
+            &["convert", &noise, &folder.text("x.rec")],
+            "noise.pcap: byte 0: neither pcap nor pcapng",
+        ),
+        (
+            &["replay", &empty, "--cid", "111"],
+            "empty.rec: byte 0: no envelope to play",
+        ),
+        (
+            &["health", "--cid", "254"],
+            "unhealthy: no daemon runs on this host",
+        ),
+    ];
+    for (arguments, expected) in cases {
+        let output = kreisel(arguments);
+        assert_eq!(code(&output), 1, "{arguments:?}");
+        let text = stderr(&output);
+        assert!(text.contains(expected), "{arguments:?}: {text}");
+        assert_eq!(text.lines().count(), 1, "{text}");
+    }
+}
+
+#[test]
+fn wrong_usage_exits_with_2() {
+    let cases: [&[&str]; 6] = [
+        &["run"],
+        &["run", "--cid", "256"],
+        &["run", "--cid=0"],
+        &["simulate", "nowhere", "--output", "/tmp/x"],
+        &["replay", "x.rec", "--cid=1", "--speed=0"],
+        &["fly"],
+    ];
+    for arguments in cases {
+        assert_eq!(code(&kreisel(arguments)), 2, "{arguments:?}");
+    }
+}
+
+#[test]
+fn scenarios_are_listed() {
+    let listed = kreisel(&["simulate", "--list"]);
+    assert_eq!(code(&listed), 0);
+    assert!(String::from_utf8_lossy(&listed.stdout).starts_with("roundabout: "));
+}

@@ -1,0 +1,19 @@
+//! What the end-to-end tests share.
+
+use std::path::{Path, PathBuf};
+
+/// A file of the shared test data; `None`, and a line that says so, where the data is absent.
+/// In CI it must be there.
+pub fn data(name: &str) -> Option<PathBuf> {
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data"));
+    if folder.is_dir() {
+        return Some(folder.join(name));
+    }
+    assert!(
+        std::env::var_os("CI").is_none(),
+        "{} is absent",
+        folder.display()
+    );
+    eprintln!("skipped: {} is absent", folder.display());
+    None
+}

@@ -1,0 +1,220 @@
+//! The windowed DBSCAN against the definition (Ester et al. 1996), by brute force: on random
+//! clouds, on a real revolution, and over the azimuth seam.
+#![cfg(feature = "shell")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use kreisel::cloud::{Intake, Scan};
+use kreisel::cluster::{ClusterParameters, Clusters, Dbscan};
+use kreisel::config::{Configuration, Profile};
+use kreisel::random::Random;
+use kreisel::wire::Envelope;
+use kreisel::wire::point_cloud::CompactPointCloud;
+use proptest::prelude::*;
+
+/// A scan of distances in centimetres, in array order.
+fn scan_of(distances_cm: &[u16], start_deg: f32, end_deg: f32) -> Scan {
+    let distances: Vec<u8> = distances_cm
+        .iter()
+        .flat_map(|cm| cm.to_be_bytes())
+        .collect();
+    let cloud = CompactPointCloud {
+        start_azimuth_deg: start_deg,
+        end_azimuth_deg: end_deg,
+        layers: 16,
+        distances: &distances,
+        ..CompactPointCloud::default()
+    };
+    let mut configuration = Configuration::default();
+    configuration.cloud.byte_order = kreisel::cloud::ByteOrderSetting::Big;
+    let mut intake = Intake::default();
+    let revolution = intake
+        .accept(&Envelope::default(), cloud, &configuration.cloud)
+        .unwrap();
+    let mut scan = Scan::default();
+    scan.fill(&revolution, &configuration.cloud);
+    scan
+}
+
+/// The definition: who is within eps of whom, counted and connected without any short cut.
+struct BruteForce {
+    points: Vec<usize>,
+    core: Vec<bool>,
+    component: Vec<usize>,
+}
+
+impl BruteForce {
+    fn new(scan: &Scan, ground: &[bool], parameters: &ClusterParameters) -> Self {
+        let used = |point: &usize| scan.has_return(*point) && !ground[*point];
+        let points: Vec<usize> = (0..scan.len()).filter(used).collect();
+        let neighbours = |a: usize| {
+            let near = move |b: &usize| are_neighbours(scan, parameters, a, *b);
+            points.iter().copied().filter(near).collect::<Vec<_>>()
+        };
+        let mut core = vec![false; scan.len()];
+        for point in &points {
+            core[*point] = neighbours(*point).len() >= needed(scan, parameters, *point);
+        }
+        let mut component = vec![usize::MAX; scan.len()];
+        for seed in points.iter().copied().filter(|point| core[*point]) {
+            if component[seed] != usize::MAX {
+                continue;
+            }
+            component[seed] = seed;
+            let mut open = vec![seed];
+            while let Some(point) = open.pop() {
+                for other in neighbours(point) {
+                    if core[other] && component[other] == usize::MAX {
+                        component[other] = seed;
+                        open.push(other);
+                    }
+                }
+            }
+        }
+        Self {
+            points,
+            core,
+            component,
+        }
+    }
+}
+
+fn eps_m(scan: &Scan, parameters: &ClusterParameters, point: usize) -> f32 {
+    parameters.eps_m as f32 + parameters.eps_per_m as f32 * scan.range_m()[point]
+}
+
+fn needed(scan: &Scan, parameters: &ClusterParameters, point: usize) -> usize {
+    let scale = parameters.min_points_range_m as f32 / scan.range_m()[point];
+    let wanted = (parameters.min_points as f32 * scale).min(parameters.min_points as f32);
+    (wanted.max(parameters.min_points_far as f32) + 0.5) as usize
+}
+
+fn squared_distance(scan: &Scan, a: usize, b: usize) -> f32 {
+    let ([ax, ay, az], [bx, by, bz]) = (scan.point_m(a), scan.point_m(b));
+    let (dx, dy, dz) = (ax - bx, ay - by, az - bz);
+    dx * dx + dy * dy + dz * dz
+}
+
+fn are_neighbours(scan: &Scan, parameters: &ClusterParameters, a: usize, b: usize) -> bool {
+    let eps = eps_m(scan, parameters, a).min(eps_m(scan, parameters, b));
+    squared_distance(scan, a, b) <= eps * eps
+}
+
+/// Clusters are the components of core points; a border point belongs to that of its nearest
+/// core neighbour; everything else is noise.
+fn assert_is_dbscan(scan: &Scan, ground: &[bool], parameters: &ClusterParameters) -> usize {
+    let clusters = Dbscan::new(parameters).process(scan, ground).clone();
+    let truth = BruteForce::new(scan, ground, parameters);
+    let mut component_of_cluster = vec![usize::MAX; clusters.len()];
+    for point in truth.points.iter().copied() {
+        let label = clusters.labels()[point];
+        if truth.core[point] {
+            assert_ne!(label, Clusters::NONE, "core point {point} is noise");
+            let component = &mut component_of_cluster[label as usize];
+            if *component == usize::MAX {
+                *component = truth.component[point];
+            }
+            assert_eq!(*component, truth.component[point], "point {point}");
+            continue;
+        }
+        let cores = truth.points.iter().copied();
+        let near = cores.filter(|b| truth.core[*b] && are_neighbours(scan, parameters, point, *b));
+        let nearest = near.min_by(|a, b| {
+            let distance = |other| squared_distance(scan, point, other);
+            distance(*a).total_cmp(&distance(*b)).then(a.cmp(b))
+        });
+        let expected = nearest.map_or(Clusters::NONE, |core| clusters.labels()[core]);
+        assert_eq!(label, expected, "border point {point}");
+    }
+    component_of_cluster.sort_unstable();
+    component_of_cluster.dedup();
+    assert_eq!(
+        component_of_cluster.len(),
+        clusters.len(),
+        "a component in two clusters"
+    );
+    truth.points.len()
+}
+
+/// Surfaces, posts and stray returns, seeded.
+fn random_distances(seed: u64, columns: usize, stray: f64) -> Vec<u16> {
+    let mut random = Random::new(seed);
+    let mut distances = vec![0; columns * 16];
+    for _ in 0..12 {
+        let (from, wide) = (random.below(columns), 1 + random.below(columns / 6));
+        let (low, high) = (random.below(16), 1 + random.below(6));
+        let near_cm = 120 + random.below(3000);
+        for column in (from..from + wide).map(|column| column % columns) {
+            for layer in low..(low + high).min(16) {
+                distances[column * 16 + layer] = (near_cm + random.below(40)) as u16;
+            }
+        }
+    }
+    for distance in &mut distances {
+        if random.uniform() < stray {
+            *distance = (100 + random.below(6000)) as u16;
+        }
+    }
+    distances
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    #[test]
+    fn random_clouds_are_clustered_as_defined(
+        seed in any::<u64>(),
+        columns in 60usize..400,
+        stray in 0.0f64..0.1,
+        eps_m in 0.2f64..1.5,
+        eps_per_m in 0.0f64..0.05,
+        min_points in 1usize..12,
+        gap_deg in 0.5f32..9.0,
+    ) {
+        let distances = random_distances(seed, columns, stray);
+        let scan = scan_of(&distances, 0.01, 360.0 - gap_deg);
+        let mut parameters = ClusterParameters::profile(Profile::Default);
+        (parameters.eps_m, parameters.eps_per_m) = (eps_m, eps_per_m);
+        parameters.min_points = min_points;
+        let mut random = Random::new(seed ^ 1);
+        let ground: Vec<bool> = (0..scan.len()).map(|_| random.uniform() < 0.2).collect();
+        assert_is_dbscan(&scan, &ground, &parameters);
+    }
+}
+
+#[test]
+fn a_sweep_that_overlaps_itself_at_the_seam_is_clustered_as_defined() {
+    let parameters = ClusterParameters::profile(Profile::Default);
+    for seed in 0..10 {
+        let distances = random_distances(seed, 360, 0.02);
+        let scan = scan_of(&distances, 0.01, 364.0);
+        assert_is_dbscan(&scan, &vec![false; scan.len()], &parameters);
+    }
+}
+
+#[test]
+fn a_real_revolution_is_clustered_as_defined() {
+    let Some(path) = common::data("vlp16-sampleShort.rec") else {
+        return;
+    };
+    let bytes = std::fs::read(path).unwrap();
+    let entry = kreisel::wire::Recording::new(&bytes)
+        .nth(2)
+        .unwrap()
+        .unwrap();
+    let cloud = CompactPointCloud::decode(entry.envelope.payload, 0).unwrap();
+    // Every fourth column: the definition takes quadratic time.
+    let distances: Vec<u16> = cloud
+        .distances
+        .chunks_exact(32)
+        .step_by(4)
+        .flat_map(|column| column.chunks_exact(2))
+        .map(|two| u16::from_be_bytes([two[0], two[1]]))
+        .collect();
+    let scan = scan_of(&distances, cloud.start_azimuth_deg, cloud.end_azimuth_deg);
+    let above_road: Vec<bool> = scan.z_m().iter().map(|z| *z < -1.4).collect();
+    let parameters = ClusterParameters::profile(Profile::Default);
+    let compared = assert_is_dbscan(&scan, &above_road, &parameters);
+    assert!(compared > 2000, "{compared} points are no test");
+}
