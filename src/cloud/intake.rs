@@ -147,17 +147,22 @@ pub struct Revolution<'a> {
 /// time that is taken for disorder rather than for a recording that begins again.
 const CONTINUITY: Span = Span::from_micros(1_000_000);
 
-/// Messages from another sender, without one from ours between, after which it is followed.
+/// Messages in a row from one other sender after which it is followed, too. The first sender
+/// is always welcome back.
 const SENDER_PATIENCE: u32 = 20;
 
-/// Keeps what must be known from message to message.
+/// Keeps what must be known from message to message. A hostile or damaged message that passes
+/// for a sound one must not cost the sound ones after it more than one of them.
 #[derive(Debug, Clone, Default)]
 pub struct Intake {
     detector: DialectDetector,
     listened: Option<u32>,
-    strangers: u32,
+    stranger: Option<(u32, u32)>,
     last_time: Option<Time>,
-    usual_step_deg: Option<f64>,
+    /// Time of a message that was refused as out of order, if it was the last one.
+    late_time: Option<Time>,
+    /// Steps between columns that are known to be right, the latest first.
+    usual_steps_deg: [Option<f64>; 2],
     refused_step_deg: Option<f64>,
 }
 
@@ -184,6 +189,7 @@ impl Intake {
         let (time, time_jumped) = self.check_time(envelope, &cloud, sensor)?;
         let dialect = self.detector.dialect(&cloud, parameters).ok_or(unknown)?;
         self.last_time = Some(time);
+        self.listened.get_or_insert(envelope.sender_stamp);
         Ok(Revolution {
             cloud,
             sensor,
@@ -203,15 +209,15 @@ impl Intake {
         let configured = u32::try_from(parameters.sender_stamp).ok();
         let listened = configured.or(self.listened).unwrap_or(sender_stamp);
         if sender_stamp == listened {
-            (self.listened, self.strangers) = (Some(listened), 0);
+            self.stranger = None;
             return Ok(());
         }
-        self.strangers += 1;
-        if configured.is_none() && self.strangers > SENDER_PATIENCE {
-            *self = Self {
-                listened: Some(sender_stamp),
-                ..Self::default()
-            };
+        let times = match self.stranger {
+            Some((stranger, times)) if stranger == sender_stamp => times + 1,
+            _ => 1,
+        };
+        self.stranger = Some((sender_stamp, times));
+        if configured.is_none() && times > SENDER_PATIENCE {
             return Ok(());
         }
         Err(Refusal::OtherSender {
@@ -246,16 +252,20 @@ impl Intake {
         parameters: &CloudParameters,
     ) -> Result<(), Refusal> {
         let close = |to: f64| (step_deg / to - 1.0).abs() <= parameters.step_tolerance;
-        let fits = match self.usual_step_deg {
-            Some(usual_deg) => close(usual_deg),
+        let [latest_deg, before_deg] = self.usual_steps_deg;
+        let fits = match latest_deg {
+            Some(latest_deg) => close(latest_deg) || before_deg.is_some_and(close),
             None => cloud.start_azimuth_deg != 0.0 || is_whole_turn(cloud, step_deg),
         };
         if fits || self.refused_step_deg.is_some_and(close) {
-            (self.usual_step_deg, self.refused_step_deg) = (Some(step_deg), None);
+            if !latest_deg.is_some_and(close) {
+                self.usual_steps_deg[1] = latest_deg;
+            }
+            (self.usual_steps_deg[0], self.refused_step_deg) = (Some(step_deg), None);
             return Ok(());
         }
         self.refused_step_deg = Some(step_deg);
-        Err(match self.usual_step_deg {
+        Err(match latest_deg {
             Some(usual_deg) if cloud.start_azimuth_deg != 0.0 => Refusal::UnevenStep {
                 step_deg,
                 usual_deg,
@@ -267,9 +277,10 @@ impl Intake {
         })
     }
 
-    /// The end of the sweep. A sender without a clock gets the time that the columns took.
+    /// The end of the sweep. A sender without a clock gets the time that the columns took. Two
+    /// messages in a row that are older than the last one mean that the last one was wrong.
     fn check_time(
-        &self,
+        &mut self,
         envelope: &Envelope<'_>,
         cloud: &CompactPointCloud<'_>,
         sensor: &Sensor,
@@ -283,7 +294,9 @@ impl Intake {
             return Ok((last + Span::from_seconds(sweep_s), false));
         }
         let passed = time - last;
-        if passed.micros() <= 0 && passed.micros() > -CONTINUITY.micros() {
+        let in_disorder = passed.micros() <= 0 && passed.micros() > -CONTINUITY.micros();
+        let late_time = std::mem::replace(&mut self.late_time, in_disorder.then_some(time));
+        if in_disorder && late_time.is_none_or(|late| time <= late || time == last) {
             return Err(Refusal::OutOfOrder {
                 late_s: -passed.seconds(),
             });
@@ -534,7 +547,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_sender_is_listened_to_until_it_is_silent() {
+    fn the_first_sender_is_listened_to_and_another_one_while_it_is_silent() {
         let mut sender = Sender::new();
         let distances = [1; 32 * 1800];
         let mut send = |stamp: u32, micros: i64| {
@@ -559,5 +572,28 @@ mod tests {
         assert!(send(3, 1_100_000));
         let taken = (0..30).filter(|n| send(4, 1_200_000 + n * 100_000)).count();
         assert_eq!(taken, 10);
+        assert!(send(3, 4_200_000));
+        assert!(!send(4, 4_300_000));
+    }
+
+    #[test]
+    fn one_message_from_the_near_future_costs_one_revolution() {
+        let mut sender = Sender::new();
+        let now = sender.micros;
+        let mut send = |millis: i64| refused(sender.send_at(now + 1000 * millis, 0.1, 359.9, 1800));
+        assert_eq!(send(0), "accepted");
+        assert_eq!(send(800), "accepted");
+        assert_eq!(send(100), "out_of_order");
+        assert_eq!(send(200), "accepted");
+        assert_eq!(send(300), "accepted");
+    }
+
+    #[test]
+    fn a_rate_that_two_odd_messages_agree_on_does_not_displace_the_right_one() {
+        let mut sender = Sender::new();
+        assert_eq!(refused(sender.send(0.1, 359.9, 1808)), "accepted");
+        assert_eq!(refused(sender.send(0.1, 352.0, 1808)), "uneven_step");
+        assert_eq!(refused(sender.send(0.1, 352.5, 1808)), "accepted");
+        assert_eq!(refused(sender.send(0.1, 359.9, 1808)), "accepted");
     }
 }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 /// A file of the shared test data; `None`, and a line that says so, where the data is absent.
 /// In CI it must be there.
+#[expect(unreachable_pub)]
 pub fn data(name: &str) -> Option<PathBuf> {
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data"));
     if folder.is_dir() {

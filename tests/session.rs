@@ -1,0 +1,491 @@
+//! The daemon over real sockets, in network namespaces that each test makes for itself: with
+//! libcluon's own tools as peers, with hostile datagrams, and with signals.
+//!
+//! Needs the right to make a namespace, the `ip` command, and for two tests the tools of PyPI's
+//! `pycluon` on the PATH. Where something is missing a test says that it was skipped, and fails
+//! in CI.
+#![cfg(feature = "shell")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use std::io::Read as _;
+use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use kreisel::random::Random;
+use kreisel::simulate::{Simulation, scenario};
+use kreisel::wire::object_list::ObjectList;
+use kreisel::wire::status::Status;
+use kreisel::wire::{Envelope, Message, Recording};
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+
+const CID: u8 = 111;
+
+/// Runs a test in a network namespace of its own, in which loopback carries multicast.
+fn in_namespace(test: impl FnOnce() + Send) {
+    std::thread::scope(|scope| {
+        let thread = scope.spawn(|| {
+            if !enter_namespace() {
+                assert!(
+                    std::env::var_os("CI").is_none(),
+                    "cannot make a network namespace"
+                );
+                eprintln!("skipped: cannot make a network namespace");
+                return;
+            }
+            test();
+        });
+        if let Err(panic) = thread.join() {
+            std::panic::resume_unwind(panic);
+        }
+    });
+}
+
+/// Namespaces belong to threads; what this thread starts later lives in its namespace, too.
+fn enter_namespace() -> bool {
+    let ip = |arguments: &str| {
+        let result = Command::new("ip").args(arguments.split(' ')).status();
+        result.is_ok_and(|status| status.success())
+    };
+    nix::sched::unshare(nix::sched::CloneFlags::CLONE_NEWNET).is_ok()
+        && ip("link set lo up")
+        && ip("route add 225.0.0.0/24 dev lo src 127.0.0.1")
+}
+
+/// A command that ends with the test.
+struct Running(Child);
+
+impl Running {
+    fn start(program: &str, arguments: &[&str]) -> Self {
+        let mut command = Command::new(program);
+        command
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        Self(command.spawn().unwrap())
+    }
+
+    fn kreisel(arguments: &[&str]) -> Self {
+        Self::start(env!("CARGO_BIN_EXE_kreisel"), arguments)
+    }
+
+    /// A daemon that is ready to receive.
+    fn daemon(arguments: &[&str]) -> Self {
+        let daemon = Self::kreisel(&[&["run", "--cid=111"], arguments].concat());
+        await_true("the daemon's health socket", || {
+            let sockets = std::fs::read_to_string("/proc/thread-self/net/unix").unwrap();
+            sockets.contains("@kreisel-health-111")
+        });
+        daemon
+    }
+
+    fn signal(&self, signal: Signal) {
+        kill(Pid::from_raw(self.0.id() as i32), signal).unwrap();
+    }
+
+    /// What it printed, once it has ended.
+    fn output(mut self) -> (i32, String, String) {
+        let (mut out, mut err) = (String::new(), String::new());
+        self.0
+            .stdout
+            .take()
+            .unwrap()
+            .read_to_string(&mut out)
+            .unwrap();
+        self.0
+            .stderr
+            .take()
+            .unwrap()
+            .read_to_string(&mut err)
+            .unwrap();
+        (self.0.wait().unwrap().code().unwrap_or(-1), out, err)
+    }
+
+    fn stop(self) -> (i32, String, String) {
+        self.signal(Signal::SIGTERM);
+        self.output()
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn await_true(what: &str, mut condition: impl FnMut() -> bool) {
+    let begin = Instant::now();
+    while !condition() {
+        assert!(
+            begin.elapsed() < Duration::from_secs(10),
+            "waited in vain for {what}"
+        );
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// A peer in the session: sends datagrams, and hears everything.
+struct Peer {
+    socket: UdpSocket,
+    group: SocketAddrV4,
+}
+
+impl Peer {
+    fn join() -> Self {
+        use socket2::{Domain, Socket, Type};
+        let group = SocketAddrV4::new(Ipv4Addr::new(225, 0, 0, CID), 12_175);
+        let socket = Socket::new(Domain::IPV4, Type::DGRAM, None).unwrap();
+        socket.set_reuse_address(true).unwrap();
+        socket.set_recv_buffer_size(8 << 20).unwrap();
+        socket.bind(&group.into()).unwrap();
+        socket
+            .join_multicast_v4(group.ip(), &Ipv4Addr::LOCALHOST)
+            .unwrap();
+        socket.set_multicast_if_v4(&Ipv4Addr::LOCALHOST).unwrap();
+        socket
+            .set_read_timeout(Some(Duration::from_millis(100)))
+            .unwrap();
+        Self {
+            socket: socket.into(),
+            group,
+        }
+    }
+
+    fn send(&self, datagram: &[u8]) {
+        self.socket.send_to(datagram, self.group).unwrap();
+    }
+
+    /// Waits for messages of a type until one pleases.
+    fn await_message<M: Message>(&self, pleases: impl Fn(&M) -> bool) -> M {
+        let mut buffer = vec![0; 65_536];
+        let begin = Instant::now();
+        while begin.elapsed() < Duration::from_secs(10) {
+            let Ok(length) = self.socket.recv(&mut buffer) else {
+                continue;
+            };
+            let Ok((envelope, _)) = Envelope::from_datagram(&buffer[..length]) else {
+                continue;
+            };
+            if envelope.data_type == M::ID {
+                let message = M::decode(envelope.payload, 0).unwrap();
+                if pleases(&message) {
+                    return message;
+                }
+            }
+        }
+        panic!("waited in vain for {}", M::NAME);
+    }
+}
+
+fn revolutions(count: usize) -> Vec<Vec<u8>> {
+    let mut simulation = Simulation::new(scenario::find("roundabout").unwrap(), 1);
+    let mut revolve = || {
+        let mut frame = vec![];
+        simulation.revolve(&mut frame);
+        frame
+    };
+    (0..count).map(|_| revolve()).collect()
+}
+
+/// Whether a program of libcluon is there.
+fn has_libcluon(program: &str) -> bool {
+    let paths = std::env::var_os("PATH").unwrap_or_default();
+    let found = std::env::split_paths(&paths).any(|path| path.join(program).is_file());
+    if !found {
+        assert!(
+            std::env::var_os("CI").is_none(),
+            "{program} is not on the PATH"
+        );
+        eprintln!("skipped: {program} is not on the PATH");
+    }
+    found
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+#[test]
+fn what_libcluon_replays_is_answered_and_libcluon_decodes_the_answer() {
+    let Some(recording) = common::data("vlp16-sampleShort.rec") else {
+        return;
+    };
+    if !has_libcluon("cluon-replay") || !has_libcluon("cluon-OD4toJSON") {
+        return;
+    }
+    in_namespace(|| {
+        let _daemon = Running::daemon(&["--id=7"]);
+        let odvd = concat!("--odvd=", env!("CARGO_MANIFEST_DIR"), "/proto/kreisel.odvd");
+        let listener = Running::start("cluon-OD4toJSON", &["--cid=111", odvd]);
+        let peer = Peer::join();
+        // Both have joined once a Status has gone out.
+        peer.await_message::<Status>(|_| true);
+        let player = Running::start("cluon-replay", &["--cid=111", text(&recording)]);
+        let last = peer.await_message::<ObjectList>(|list| list.revolution == 2);
+        let status = peer.await_message::<Status>(|status| status.revolutions_published == 3);
+        assert!(last.count > 10);
+        assert_eq!(status.faults, "first_azimuth=1");
+        assert!((1.5..1.75).contains(&status.ground_height));
+        assert_eq!(status.byte_order, "big-endian");
+        drop(player);
+        std::thread::sleep(Duration::from_millis(300));
+        let (_, json, _) = listener.stop();
+        assert!(json.contains("Parsed 3 message(s)."), "{json:.200}");
+        assert_eq!(
+            json.matches("\"kreisel_ObjectList\":{\"revolution\":")
+                .count(),
+            3
+        );
+        assert!(json.contains("\"senderStamp\":7"));
+        assert!(json.contains(&format!("\"count\":{},", last.count)));
+    });
+}
+
+#[test]
+fn every_hostile_datagram_is_counted_by_name_and_the_next_revolution_is_answered() {
+    in_namespace(|| {
+        let _daemon = Running::daemon(&[]);
+        let peer = Peer::join();
+        let good = revolutions(3);
+        peer.send(&good[0]);
+        peer.await_message::<ObjectList>(|list| list.revolution == 0);
+        for datagram in hostile_datagrams(&good[0]) {
+            peer.send(&datagram);
+            // A flood would test the kernel's buffer instead.
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        peer.send(&good[1]);
+        peer.await_message::<ObjectList>(|list| list.revolution == 1);
+        let status = peer.await_message::<Status>(|status| status.revolutions_published == 2);
+        for name in [
+            "bad_magic",
+            "frame_truncated",
+            "length_beyond_end",
+            "varint_too_long",
+            "trailing_bytes",
+            "out_of_order",
+            "zero_layers",
+            "too_many_columns",
+            "other_sender",
+        ] {
+            assert!(
+                status.faults.contains(&format!("{name}=")),
+                "{name}: {}",
+                status.faults
+            );
+        }
+        assert!(status.datagrams_damaged > 0 && status.revolutions_refused > 0);
+    });
+}
+
+/// The edge cases of the wire, refusals, and two thousand mutations of a revolution's frame.
+fn hostile_datagrams(revolution: &[u8]) -> Vec<Vec<u8>> {
+    use kreisel::wire::envelope::Postmark;
+    use kreisel::wire::point_cloud::CompactPointCloud;
+    let cloud = |layers: u8, columns: usize, sender_stamp: u32| {
+        let distances = vec![1; 2 * usize::from(layers.max(1)) * columns];
+        let cloud = CompactPointCloud {
+            end_azimuth_deg: 359.8,
+            layers,
+            distances: &distances,
+            ..CompactPointCloud::default()
+        };
+        let mut frame = vec![];
+        let postmark = Postmark {
+            sender_stamp,
+            ..Postmark::default()
+        };
+        postmark.put_payload(&mut frame, 49, |out| cloud.encode(out));
+        frame
+    };
+    let mut datagrams: Vec<Vec<u8>> = vec![
+        vec![],
+        vec![0x0d],
+        b"no frame at all".to_vec(),
+        b"\x0d\xa4\x27\x00\x00\x08\xd4".to_vec(),
+        b"\x0d\xa4\x00\x00\x00".to_vec(),
+        b"\x0d\xa4\x03\x00\x00\x12\xe8\x07".to_vec(),
+        b"\x0d\xa4\x07\x00\x00\x12\x80\x80\x80\x80\x80\x20".to_vec(),
+        b"\x0d\xa4\x0d\x00\x00\x08\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff\x01".to_vec(),
+        [revolution, b"trailing"].concat(),
+        revolution.to_vec(),
+        cloud(0, 16, 0),
+        cloud(16, 2001, 0),
+        cloud(16, 1800, 99),
+    ];
+    let mut random = Random::new(5);
+    datagrams.extend((0..2000).map(|_| {
+        let mut mutated = revolution.to_vec();
+        for _ in 0..=random.below(3) {
+            // Mostly where the structure is.
+            let range = if random.below(4) == 0 {
+                mutated.len()
+            } else {
+                40
+            };
+            mutated[random.below(range)] = random.next_u64() as u8;
+        }
+        // The sender stays, or the daemon would follow another one.
+        *mutated.last_mut().unwrap() = 0;
+        mutated
+    }));
+    datagrams
+}
+
+#[test]
+fn either_signal_stops_the_daemon_within_200_ms() {
+    in_namespace(|| {
+        for signal in [Signal::SIGTERM, Signal::SIGINT] {
+            let daemon = Running::daemon(&[]);
+            let peer = Peer::join();
+            peer.send(&revolutions(1)[0]);
+            peer.await_message::<ObjectList>(|_| true);
+            let begin = Instant::now();
+            daemon.signal(signal);
+            let (code, _, log) = daemon.output();
+            assert!(
+                begin.elapsed() < Duration::from_millis(200),
+                "{:?}",
+                begin.elapsed()
+            );
+            assert_eq!(code, 0, "{log}");
+            assert!(log.contains("receive buffer"), "{log}");
+        }
+    });
+}
+
+#[test]
+fn the_daemon_ignores_what_it_sends_and_says_how_it_is() {
+    in_namespace(|| {
+        let health = |expected: &str| {
+            let (code, _, problem) = Running::kreisel(&["health"]).output();
+            assert!(problem.contains(expected), "{problem}");
+            code
+        };
+        assert_eq!(health("no daemon runs"), 1);
+        let _daemon = Running::daemon(&[]);
+        assert_eq!(health("no revolution was answered yet"), 1);
+        let peer = Peer::join();
+        for revolution in revolutions(5) {
+            peer.send(&revolution);
+        }
+        let status = peer.await_message::<Status>(|status| status.revolutions_published == 5);
+        assert_eq!(health(""), 0);
+        assert!(status.healthy && status.latency_max > 0.0);
+        assert!(status.datagrams_own >= 5, "{status:?}");
+        assert_eq!(status.faults, "");
+    });
+}
+
+#[test]
+fn a_recording_played_and_recorded_comes_back_byte_for_byte() {
+    in_namespace(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let (played, recorded) = (
+            folder.path().join("played.rec"),
+            folder.path().join("recorded.rec"),
+        );
+        std::fs::write(&played, revolutions(8).concat()).unwrap();
+        let recorder = Running::kreisel(&[
+            "record",
+            text(&recorded),
+            "--cid=111",
+            "--interface=127.0.0.1",
+        ]);
+        let joined = || {
+            std::fs::read_to_string("/proc/thread-self/net/udp")
+                .unwrap()
+                .contains(":2F8F")
+        };
+        await_true("the recorder", joined);
+        let (code, _, problem) = Running::kreisel(&[
+            "replay",
+            text(&played),
+            "--cid=111",
+            "--interface=127.0.0.1",
+            "--speed=4",
+        ])
+        .output();
+        assert_eq!(code, 0, "{problem}");
+        std::thread::sleep(Duration::from_millis(100));
+        assert_eq!(recorder.stop().0, 0);
+        assert!(std::fs::read(played).unwrap() == std::fs::read(recorded).unwrap());
+    });
+}
+
+#[test]
+fn the_daemon_publishes_what_process_writes() {
+    in_namespace(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let (input, output) = (folder.path().join("in.rec"), folder.path().join("out.rec"));
+        let revolutions = revolutions(6);
+        std::fs::write(&input, revolutions.concat()).unwrap();
+        let (code, ..) =
+            Running::kreisel(&["process", text(&input), "--output", text(&output)]).output();
+        assert_eq!(code, 0);
+        let bytes = std::fs::read(output).unwrap();
+        let processed: Vec<ObjectList> = Recording::new(&bytes)
+            .map(|entry| entry.unwrap().envelope)
+            .filter(|envelope| envelope.data_type == ObjectList::ID)
+            .map(|envelope| ObjectList::decode(envelope.payload, 0).unwrap())
+            .collect();
+        let _daemon = Running::daemon(&[]);
+        let peer = Peer::join();
+        for (revolution, expected) in revolutions.iter().zip(processed) {
+            peer.send(revolution);
+            let mut published = peer.await_message::<ObjectList>(|_| true);
+            // Only the clock knows this one.
+            published.processing_time = 0.0;
+            assert_eq!(published, expected);
+        }
+    });
+}
+
+#[test]
+fn no_revolution_is_lost_at_20_hz_beside_a_busy_process_on_one_core() {
+    in_namespace(|| {
+        let kreisel = env!("CARGO_BIN_EXE_kreisel");
+        let pinned =
+            |command: &[&str]| Running::start("taskset", &[&["-c", "0"], command].concat());
+        let _busy = pinned(&["sh", "-c", "while :; do :; done"]);
+        let _daemon = pinned(&[kreisel, "run", "--cid=111"]);
+        await_true("the daemon", || {
+            std::fs::read_to_string("/proc/thread-self/net/unix")
+                .unwrap()
+                .contains("@kreisel-health")
+        });
+        let peer = Peer::join();
+        for revolution in revolutions(100) {
+            peer.send(&revolution);
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        let status = peer.await_message::<Status>(|status| status.revolutions_received >= 100);
+        assert_eq!(status.revolutions_published, 100);
+        assert_eq!(
+            (
+                status.revolutions_queue_dropped,
+                status.datagrams_kernel_dropped
+            ),
+            (0, 0)
+        );
+        println!(
+            "latency: median {} s, 99th percentile {} s",
+            status.latency_median, status.latency_p99
+        );
+    });
+}
+
+#[test]
+fn the_demo_shows_objects_and_ends_by_itself() {
+    in_namespace(|| {
+        let (code, shown, log) = Running::kreisel(&["demo", "--duration=2.5"]).output();
+        assert_eq!(code, 0, "{log}");
+        assert!(shown.contains("revolution 10:"), "{shown}");
+        assert!(shown.lines().count() > 10, "{shown}");
+    });
+}
