@@ -6,13 +6,11 @@ use std::time::Duration;
 
 use anyhow::Result;
 use clap::Args;
-use tokio::time::{Instant, sleep_until};
 
 use super::{Completion, block_on, simulate, stop_signal};
 use crate::config::Configuration;
-use crate::daemon::session::{Sender, Session};
+use crate::daemon::session::Session;
 use crate::daemon::{self, Options};
-use crate::simulate::{Simulation, scenario};
 use crate::wire::object_list::{Object, ObjectList};
 use crate::wire::{Envelope, Message};
 
@@ -31,7 +29,6 @@ pub(super) struct Arguments {
 
 /// senderStamp of the demo's objects, to tell them from those of another daemon.
 const SENDER_STAMP: u32 = 2021;
-const ROTATION_PERIOD: Duration = Duration::from_millis(100);
 
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     block_on(demonstrate(arguments))?;
@@ -43,6 +40,7 @@ async fn demonstrate(arguments: &Arguments) -> Result<()> {
         cid: arguments.cid,
         interface: Some(Ipv4Addr::LOCALHOST),
     };
+    let roundabout = simulate::find("roundabout").map_err(anyhow::Error::msg)?;
     let configuration = Configuration::default();
     let sender = session.sender(&configuration.session)?;
     let options = Options {
@@ -62,25 +60,8 @@ async fn demonstrate(arguments: &Arguments) -> Result<()> {
     };
     tokio::select! {
         result = daemon::run(options, stop) => Ok(result?),
-        result = send_revolutions(arguments.seed, &sender) => result,
+        result = simulate::send(&roundabout, arguments.seed, 1.0, &sender) => result,
         result = show_objects(session) => result,
-    }
-}
-
-/// The simulated sensor at its own pace.
-async fn send_revolutions(seed: u64, sender: &Sender) -> Result<()> {
-    let Some(roundabout) = scenario::find("roundabout") else {
-        return Ok(());
-    };
-    let mut simulation = Simulation::new(roundabout, seed);
-    let mut frame = vec![];
-    let mut due = Instant::now();
-    loop {
-        frame.clear();
-        simulation.revolve(&mut frame);
-        due += ROTATION_PERIOD;
-        sleep_until(due).await;
-        sender.send(&frame)?;
     }
 }
 

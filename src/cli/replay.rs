@@ -1,16 +1,16 @@
 //! `kreisel replay`: a recording back onto the network.
 
 use std::path::PathBuf;
-use std::pin::pin;
 use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
 use tokio::time::{Instant, sleep_until};
 
-use super::{Completion, SessionArguments, block_on, files, stop_signal};
+use super::{Completion, SessionArguments, block_on, files, simulate, stop_signal};
 use crate::config::Configuration;
 use crate::daemon::session::Sender;
+use crate::simulate::scenario::Scenario;
 use crate::wire::Recording;
 use crate::wire::frame::MAX_DATAGRAM_LEN;
 use crate::wire::recording::Entry;
@@ -28,7 +28,13 @@ pub(super) struct Arguments {
     /// Begin again at the end.
     #[arg(long = "loop")]
     repeat: bool,
+    /// Where there is no such file, send a simulated session instead.
+    #[arg(long, value_name = "SCENARIO", value_parser = simulate::find)]
+    or_simulate: Option<Scenario>,
 }
+
+/// Seed of the simulation that stands in for a recording.
+const SEED: u64 = 1;
 
 /// Longest pause that is waited for, as in libcluon's player: what is longer is a gap in the
 /// recording or a time stamp from elsewhere.
@@ -42,6 +48,31 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
+    match &arguments.or_simulate {
+        Some(scenario) if !arguments.input.exists() => {
+            block_on(simulate(arguments, scenario))?;
+            Ok(Completion::Done)
+        }
+        _ => replay(arguments),
+    }
+}
+
+/// A simulated session at its own pace, without end.
+async fn simulate(arguments: &Arguments, scenario: &Scenario) -> Result<()> {
+    let session = arguments.session.session();
+    let sender = session.sender(&Configuration::default().session)?;
+    let (path, group) = (arguments.input.display(), session.group());
+    tracing::info!(
+        "{path} does not exist: simulating \"{}\" to {group}",
+        scenario.name
+    );
+    tokio::select! {
+        result = simulate::send(scenario, SEED, arguments.speed, &sender) => result,
+        () = stop_signal() => Ok(()),
+    }
+}
+
+fn replay(arguments: &Arguments) -> Result<Completion> {
     let bytes = files::read(&arguments.input)?;
     let (mut entries, mut completion) = (vec![], Completion::Done);
     for item in Recording::new(&bytes) {
@@ -67,7 +98,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     block_on(async {
         tokio::select! {
             result = play(arguments, &entries) => result,
-            () = pin!(stop_signal()) => Ok(()),
+            () = stop_signal() => Ok(()),
         }
     })?;
     Ok(completion)

@@ -1,12 +1,15 @@
 //! `kreisel simulate`: a synthetic session with truth.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use anyhow::Result;
 use clap::Args;
+use tokio::time::{Instant, sleep_until};
 
 use super::files::{Output, progress};
 use super::{Completion, objects};
+use crate::daemon::session::Sender;
 use crate::simulate::Simulation;
 use crate::simulate::scenario::{self, Scenario};
 
@@ -37,7 +40,8 @@ const LONGEST_S: f64 = 86_400.0;
 /// Revolutions a second.
 const ROTATION_HZ: f64 = 10.0;
 
-fn find(name: &str) -> Result<Scenario, String> {
+/// A scenario by its name.
+pub(super) fn find(name: &str) -> Result<Scenario, String> {
     let names = || {
         scenario::all()
             .iter()
@@ -55,6 +59,26 @@ pub(super) fn duration(text: &str) -> Result<f64, String> {
         _ => Err(format!(
             "not a number of seconds above 0 and up to {LONGEST_S}"
         )),
+    }
+}
+
+/// Sends a scenario into a session for ever, at `speed` times its own pace.
+pub(super) async fn send(
+    scenario: &Scenario,
+    seed: u64,
+    speed: f64,
+    sender: &Sender,
+) -> Result<()> {
+    let mut simulation = Simulation::new(scenario.clone(), seed);
+    let period = Duration::from_secs_f64(1.0 / (ROTATION_HZ * speed));
+    let mut frame = vec![];
+    let mut due = Instant::now();
+    loop {
+        frame.clear();
+        simulation.revolve(&mut frame);
+        due += period;
+        sleep_until(due).await;
+        sender.send(&frame)?;
     }
 }
 

@@ -62,6 +62,8 @@ impl DialectDetector {
         cloud: &CompactPointCloud<'_>,
         parameters: &CloudParameters,
     ) -> Option<Dialect> {
+        // First what can refuse the message: a refused one shows nothing.
+        let unit_m = unit_m(cloud, parameters.distance_unit)?;
         let (byte_order, byte_order_source) = match parameters.byte_order {
             ByteOrderSetting::Big => (ByteOrder::Big, ByteOrderSource::Configured),
             ByteOrderSetting::Little => (ByteOrder::Little, ByteOrderSource::Configured),
@@ -71,7 +73,7 @@ impl DialectDetector {
             byte_order,
             byte_order_source,
             distance_mask: cloud.distance_mask(),
-            unit_m: unit_m(cloud, parameters.distance_unit)?,
+            unit_m,
             intensity_bits: cloud.intensity_bits,
         })
     }

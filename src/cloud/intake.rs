@@ -296,7 +296,7 @@ impl Intake {
         let passed = time - last;
         let in_disorder = passed.micros() <= 0 && passed.micros() > -CONTINUITY.micros();
         let late_time = std::mem::replace(&mut self.late_time, in_disorder.then_some(time));
-        if in_disorder && late_time.is_none_or(|late| time <= late || time == last) {
+        if in_disorder && late_time.is_none_or(|late| time <= late) {
             return Err(Refusal::OutOfOrder {
                 late_s: -passed.seconds(),
             });

@@ -1,6 +1,7 @@
 //! DBSCAN over the rows of the array.
 
 use super::partition::Partition;
+use super::runs::{Run, Runs};
 use super::window::Windows;
 use super::{ClusterParameters, Clusters};
 use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, Scan};
@@ -14,6 +15,9 @@ pub struct Dbscan {
     /// Points that are looked at, in array order.
     candidates: Vec<u32>,
     core: Vec<bool>,
+    /// Whether a point is its only neighbour.
+    alone: Vec<bool>,
+    runs: Runs,
     partition: Partition,
     /// Cluster of each representative, while clusters are numbered.
     numbers: Vec<i32>,
@@ -57,6 +61,8 @@ impl Dbscan {
                 .collect(),
             candidates: vec![],
             core: vec![],
+            alone: vec![],
+            runs: Runs::default(),
             partition: Partition::default(),
             numbers: vec![],
             clusters: Clusters::default(),
@@ -109,32 +115,43 @@ impl Dbscan {
     }
 
     fn find_core_points(&mut self, scan: &Scan) {
-        self.core.clear();
-        self.core.resize(scan.len(), false);
+        for marks in [&mut self.core, &mut self.alone] {
+            marks.clear();
+            marks.resize(scan.len(), false);
+        }
         for point in &self.candidates {
             let point = *point as usize;
             let centre = self.centre(scan, point);
             let needed = self.parameters.min_points(centre.range_m);
-            self.core[point] = self.has_neighbours(&centre, needed);
+            let neighbours = self.neighbours_up_to(&centre, needed);
+            self.core[point] = neighbours >= needed;
+            self.alone[point] = neighbours == 1;
         }
     }
 
-    /// Whether a point has `needed` neighbours, itself included. The own layer comes first: it
-    /// has most of them, and mostly enough.
-    fn has_neighbours(&self, centre: &Centre, needed: u32) -> bool {
+    /// How many neighbours a point has, itself included; counting stops at `needed`. Most
+    /// points on a surface have enough among the next few of their own layer.
+    fn neighbours_up_to(&self, centre: &Centre, needed: u32) -> u32 {
+        let own = self.reach(centre, centre.layer).unwrap_or(0);
+        let next_few = own.min(needed as usize);
+        let found = self.count(centre, centre.layer, next_few);
+        if found >= needed || next_few == 0 {
+            return found;
+        }
         let mut found = 0;
-        for layer in nearest_first(centre.layer) {
-            let Some(reach) = self.reach(centre, layer) else {
-                continue;
-            };
-            for stretch in self.windows.stretches(centre.column, reach, reach) {
-                found += self.rows[layer].count(stretch, centre);
-                if found >= needed {
-                    return true;
-                }
+        for (layer, reach) in self.layers(centre) {
+            found += self.count(centre, layer, reach);
+            if found >= needed {
+                break;
             }
         }
-        false
+        found
+    }
+
+    fn count(&self, centre: &Centre, layer: usize, reach: usize) -> u32 {
+        let stretches = self.windows.stretches(centre.column, reach, reach);
+        let counts = stretches.map(|stretch| self.rows[layer].count(stretch, centre));
+        counts.into_iter().sum()
     }
 
     fn reach(&self, centre: &Centre, layer: usize) -> Option<usize> {
@@ -142,31 +159,107 @@ impl Dbscan {
             .reach(centre.layer, layer, centre.range_m, centre.eps_m)
     }
 
-    /// Joins every core point with the core points before it. Of two neighbours each is in the
-    /// window of the other, and one of them is the earlier one on the circle.
+    /// The layers that can hold neighbours of a point, with their reach: its own first, then
+    /// those below and those above until one is too far. The farther a layer, the less it
+    /// reaches.
+    fn layers(&self, centre: &Centre) -> impl Iterator<Item = (usize, usize)> {
+        let within = |layer: usize| self.reach(centre, layer).map(|reach| (layer, reach));
+        let below = (0..centre.layer).rev().map_while(within);
+        let above = (centre.layer + 1..MAX_LAYERS).map_while(within);
+        within(centre.layer).into_iter().chain(below).chain(above)
+    }
+
+    /// Joins core points that are neighbours: first along the layers, then run by run with the
+    /// runs of the same layer and of those above, because neighbours see each other.
     fn join_core_points(&mut self, scan: &Scan) {
         self.partition.reset(scan.len());
-        for point in &self.candidates {
-            let point = *point as usize;
-            if !self.core[point] {
-                continue;
+        self.join_along_layers(scan);
+        let mut partition = std::mem::take(&mut self.partition);
+        for layer in 0..MAX_LAYERS {
+            for run in self.runs.of(layer) {
+                self.join_run(scan, &mut partition, layer, run);
             }
-            let centre = self.centre(scan, point);
-            for layer in 0..MAX_LAYERS {
-                let Some(reach) = self.reach(&centre, layer) else {
+        }
+        self.partition = partition;
+    }
+
+    /// Core points of a layer that follow each other within reach are one run.
+    fn join_along_layers(&mut self, scan: &Scan) {
+        for layer in 0..MAX_LAYERS {
+            let mut last: Option<Centre> = None;
+            self.runs.begin_layer(layer);
+            for column in 0..scan.columns() {
+                let point = scan.index(column, layer);
+                if !self.core[point] {
                     continue;
-                };
-                for stretch in self.windows.stretches(centre.column, reach, 0) {
-                    let row = &self.rows[layer];
-                    for column in stretch {
-                        let other = scan.index(column, layer);
-                        if self.core[other] && row.squared_distance(column, &centre).is_some() {
-                            self.partition.join(point as u32, other as u32);
-                        }
+                }
+                let centre = self.centre(scan, point);
+                match last {
+                    Some(last) if self.sees(&last, layer, column) => {
+                        let before = scan.index(last.column, layer);
+                        self.partition.join(point as u32, before as u32);
+                        self.runs.extend(layer, column, centre.range_m);
+                    }
+                    _ => self.runs.begin(layer, column, centre.range_m),
+                }
+                last = Some(centre);
+            }
+        }
+    }
+
+    /// Joins a run with all others that any of its points has a neighbour in. Its nearest
+    /// point reaches farthest.
+    fn join_run(&self, scan: &Scan, partition: &mut Partition, layer: usize, run: &Run) {
+        let first = scan.index(run.columns.start, layer) as u32;
+        let (near_m, far_m) = (run.low_m, run.high_m);
+        let (eps_near_m, eps_far_m) = (self.parameters.eps_m(near_m), self.parameters.eps_m(far_m));
+        for other in layer..MAX_LAYERS {
+            let Some(reach) = self.windows.reach(layer, other, near_m, eps_near_m) else {
+                break;
+            };
+            for stretch in self.windows.around(&run.columns, reach) {
+                for candidate in self.runs.within(other, &stretch) {
+                    let too_far = candidate.high_m < near_m - eps_far_m
+                        || candidate.low_m > far_m + eps_far_m;
+                    let other_first = scan.index(candidate.columns.start, other) as u32;
+                    if !too_far
+                        && partition.find(first) != partition.find(other_first)
+                        && self.touch(scan, (layer, run), (other, candidate))
+                    {
+                        partition.join(first, other_first);
                     }
                 }
             }
         }
+    }
+
+    /// Whether any core point of one run is a neighbour of any of the other.
+    fn touch(&self, scan: &Scan, (layer, run): (usize, &Run), other: (usize, &Run)) -> bool {
+        let (other_layer, other) = other;
+        let core = |layer: usize| move |column: &usize| self.core[scan.index(*column, layer)];
+        run.columns.clone().filter(core(layer)).any(|column| {
+            let centre = self.centre(scan, scan.index(column, layer));
+            let Some(reach) = self.reach(&centre, other_layer) else {
+                return false;
+            };
+            let row = &self.rows[other_layer];
+            let stretches = self.windows.stretches(column, reach, reach);
+            stretches.into_iter().any(|stretch| {
+                let start = stretch.start.max(other.columns.start);
+                let both = start..stretch.end.min(other.columns.end).max(start);
+                row.count(both.clone(), &centre) > 0
+                    && both
+                        .filter(core(other_layer))
+                        .any(|column| row.is_neighbour(column, &centre))
+            })
+        })
+    }
+
+    /// Whether the point in a column is a neighbour of a point and in its window.
+    fn sees(&self, centre: &Centre, layer: usize, column: usize) -> bool {
+        self.reach(centre, layer)
+            .is_some_and(|reach| centre.column.abs_diff(column) <= reach)
+            && self.rows[layer].is_neighbour(column, centre)
     }
 
     /// Numbers clusters by their first core point.
@@ -198,7 +291,7 @@ impl Dbscan {
     fn adopt_border_points(&mut self, scan: &Scan) {
         for point in &self.candidates {
             let point = *point as usize;
-            if self.core[point] {
+            if self.core[point] || self.alone[point] {
                 continue;
             }
             if let Some(core) = self.nearest_core_point(scan, point) {
@@ -210,10 +303,7 @@ impl Dbscan {
     fn nearest_core_point(&self, scan: &Scan, point: usize) -> Option<usize> {
         let centre = self.centre(scan, point);
         let mut nearest: Option<(f32, usize)> = None;
-        for layer in 0..MAX_LAYERS {
-            let Some(reach) = self.reach(&centre, layer) else {
-                continue;
-            };
+        for (layer, reach) in self.layers(&centre) {
             for stretch in self.windows.stretches(centre.column, reach, reach) {
                 for column in stretch {
                     let other = scan.index(column, layer);
@@ -277,6 +367,10 @@ impl Row {
         found
     }
 
+    fn is_neighbour(&self, column: usize, centre: &Centre) -> bool {
+        self.squared_distance(column, centre).is_some()
+    }
+
     /// Squared distance of the point in a column, if it is a neighbour.
     fn squared_distance(&self, column: usize, centre: &Centre) -> Option<f32> {
         let [x, y, z] = centre.position_m;
@@ -289,13 +383,6 @@ impl Row {
         let eps_squared = (centre.eps_m * centre.eps_m).min(self.eps_squared[column]);
         (squared <= eps_squared).then_some(squared)
     }
-}
-
-/// All layers, beginning with one and going outward.
-fn nearest_first(layer: usize) -> impl Iterator<Item = usize> {
-    let outward =
-        (1..MAX_LAYERS).flat_map(move |step| [layer.checked_sub(step), Some(layer + step)]);
-    std::iter::once(layer).chain(outward.flatten().filter(|layer| *layer < MAX_LAYERS))
 }
 
 #[cfg(test)]
@@ -369,12 +456,5 @@ mod tests {
             _ => 0,
         });
         assert_eq!(cluster(&scan, Profile::Default).len(), 1);
-    }
-
-    #[test]
-    fn nearest_layers_come_first() {
-        let order: Vec<usize> = nearest_first(14).collect();
-        assert_eq!(order[..5], [14, 13, 15, 12, 11]);
-        assert_eq!(order.len(), 16);
     }
 }

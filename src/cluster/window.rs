@@ -84,6 +84,11 @@ impl Windows {
         Some(reach.min(self.columns / 2))
     }
 
+    /// The columns within `reach` of any of `columns`.
+    pub(super) fn around(&self, columns: &Range<usize>, reach: usize) -> [Range<usize>; 2] {
+        self.stretches(columns.start, reach, columns.len() - 1 + reach)
+    }
+
     /// The columns from `reach` before to `after` behind a column, over the seam at 0: at
     /// most two stretches, the second one often empty.
     pub(super) fn stretches(&self, column: usize, reach: usize, after: usize) -> [Range<usize>; 2] {

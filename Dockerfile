@@ -1,0 +1,18 @@
+# A small image with one static binary: no shell, no package manager, not root.
+FROM rust:1-slim-bookworm AS build
+WORKDIR /build
+COPY Cargo.toml Cargo.lock ./
+COPY src src
+COPY benches benches
+# Linking libc statically needs the target to be named, whichever it is.
+RUN target="$(rustc -vV | sed -n 's/host: //p')" \
+    && RUSTFLAGS="-C target-feature=+crt-static" \
+       cargo build --release --locked --bin kreisel --target "$target" \
+    && cp "target/$target/release/kreisel" /kreisel
+
+FROM scratch
+COPY --from=build /kreisel /kreisel
+USER 65532:65532
+HEALTHCHECK --interval=5s --timeout=3s --start-period=5s --retries=3 CMD ["/kreisel", "health"]
+ENTRYPOINT ["/kreisel"]
+CMD ["--help"]
