@@ -8,10 +8,12 @@ use kreisel::wire::status::Status;
 use kreisel::wire::{FieldDescription, Message};
 use prost_reflect::{DescriptorPool, DynamicMessage, Value};
 
-/// Messages of an .odvd: name, id, fields as (number, name, type).
-fn odvd_messages() -> Vec<(String, i32, Vec<(u32, String, String)>)> {
+/// A message of an .odvd: name, id, fields as (number, name, type).
+type Described = (String, i32, Vec<(u32, String, String)>);
+
+fn odvd_messages() -> Vec<Described> {
     let text = include_str!("../proto/kreisel.odvd");
-    let mut messages: Vec<(String, i32, Vec<(u32, String, String)>)> = vec![];
+    let mut messages: Vec<Described> = vec![];
     let number = |line: &str| -> String {
         let from = line.find("id = ").unwrap() + 5;
         line[from..]
@@ -35,7 +37,7 @@ fn odvd_messages() -> Vec<(String, i32, Vec<(u32, String, String)>)> {
     messages
 }
 
-fn table<M: Message>() -> (String, i32, Vec<(u32, String, String)>) {
+fn table<M: Message>() -> Described {
     let field = |field: &FieldDescription| (field.id, field.name.into(), field.kind.into());
     (M::NAME.into(), M::ID, M::FIELDS.iter().map(field).collect())
 }

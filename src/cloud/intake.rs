@@ -329,7 +329,7 @@ fn check_shape(cloud: &CompactPointCloud<'_>) -> Result<&'static Sensor, Refusal
     if bytes == 0 {
         return Err(Refusal::NoDistances);
     }
-    if bytes % (2 * usize::from(layers)) != 0 {
+    if !bytes.is_multiple_of(2 * usize::from(layers)) {
         return Err(Refusal::BrokenColumns { bytes, layers });
     }
     if cloud.columns() > MAX_COLUMNS {

@@ -88,9 +88,9 @@ impl Dbscan {
 
     fn gather(&mut self, scan: &Scan, ground: &[bool]) {
         self.candidates.clear();
-        for point in 0..scan.len() {
+        for (point, is_ground) in ground.iter().enumerate().take(scan.len()) {
             let (column, row) = (scan.column(point), &mut self.rows[scan.layer(point)]);
-            if !scan.has_return(point) || ground[point] {
+            if !scan.has_return(point) || *is_ground {
                 row.x_m[column] = f32::INFINITY;
                 continue;
             }

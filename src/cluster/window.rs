@@ -18,9 +18,9 @@ pub(super) struct Windows {
     cosine: [f32; MAX_LAYERS],
 }
 
-/// Chords up to this length are at most 1.0472 times shorter than their arc.
+/// A chord of this length, in radii, spans an arc of pi / 3; shorter ones are closer to theirs.
 const LONGEST_CHORD: f32 = 1.0;
-const ARC_PER_CHORD: f32 = 1.0472;
+const ARC_PER_CHORD: f32 = std::f32::consts::FRAC_PI_3;
 
 impl Windows {
     pub(super) fn new(parameters: &ClusterParameters) -> Self {

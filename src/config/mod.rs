@@ -1,5 +1,5 @@
 //! What a user may set. Each stage declares its parameters once, with both profiles' values,
-//! range, unit and meaning ([`parameters!`]); printing, reading and checking follow from that.
+//! range, unit and meaning (`parameters!`); printing, reading and checking follow from that.
 
 mod parameter;
 

@@ -346,7 +346,7 @@ macro_rules! parameters {
         }
     };
     (@bounds) => { None };
-    (@bounds $low:literal, $high:literal) => { Some(($low as f64, $high as f64)) };
+    (@bounds $low:literal, $high:literal) => { Some((f64::from($low), f64::from($high))) };
 }
 pub(crate) use parameters;
 

@@ -236,7 +236,7 @@ impl Receiver {
 fn take(
     fd: RawFd,
     datagram: &mut [u8],
-    control: &mut Vec<u8>,
+    control: &mut [u8],
     own: Option<SocketAddr>,
 ) -> io::Result<Option<(usize, Arrival)>> {
     let mut slices = [IoSliceMut::new(datagram)];

@@ -33,7 +33,7 @@ impl Minima {
         for segment in &mut self.segments {
             segment.clear();
         }
-        let [a, b, c] = reference.normal().map(|component| component as f32);
+        let height_m = reference.heights();
         let far_squared = (range_m * range_m) as f32;
         let (x_m, y_m, z_m) = (scan.x_m(), scan.y_m(), scan.z_m());
         for column in 0..scan.columns() {
@@ -41,8 +41,8 @@ impl Minima {
             let segment = &mut self.segments[slice];
             for point in scan.index(column, 0)..scan.index(column + 1, 0) {
                 let near = x_m[point] * x_m[point] + y_m[point] * y_m[point] <= far_squared;
-                let above_m = a * x_m[point] + b * y_m[point] + c * z_m[point];
                 if near && scan.has_return(point) {
+                    let above_m = height_m(x_m[point], y_m[point], z_m[point]);
                     let point = point as u32;
                     insert(segment, self.per_segment, Minimum { above_m, point });
                 }

@@ -12,6 +12,8 @@ mod ransac;
 
 pub use plane::Plane;
 
+use nalgebra::Vector3;
+
 use crate::cloud::Scan;
 use crate::config::{choices, parameters};
 use crate::random::Random;
@@ -63,6 +65,10 @@ parameters! {
         /// Revolutions in a row without a plausible plane after which it is sought anew,
         /// within the whole range of heights and tilts.
         follow_patience: usize = 10, in 1..=1000, "revolutions";
+        /// How often the plane is fitted again to all returns near it, within the range of the
+        /// candidates. The lowest returns lie below the road by their noise and in its hollows;
+        /// all of them together lie on it.
+        refinements: usize = 3, thesis 0, in 0..=20, "";
         /// Height of the sensor that is taken when no plane was ever plausible.
         fallback_height_m: f64 = 1.9, thesis 2.05, in 0.1..=10.0, "m";
         /// Distance to the plane within which a return is ground.
@@ -112,6 +118,8 @@ pub struct Ground {
     misses: usize,
     revolutions: u64,
     minima: Minima,
+    /// Returns that the plane is refined with.
+    near: Vec<Vector3<f64>>,
     mask: Vec<bool>,
 }
 
@@ -124,6 +132,7 @@ impl Ground {
             misses: 0,
             revolutions: 0,
             minima: Minima::new(parameters.segments, parameters.lowest_per_segment),
+            near: Vec::with_capacity(crate::cloud::CAPACITY),
             mask: Vec::with_capacity(crate::cloud::CAPACITY),
         }
     }
@@ -147,6 +156,7 @@ impl Ground {
         let mut random = Random::new(self.parameters.seed as u64 ^ self.revolutions << 20);
         let near = followed.filter(|_| self.misses < self.parameters.follow_patience);
         let found = ransac::find(&self.minima, near.as_ref(), &self.parameters, &mut random);
+        let found = found.map(|plane| self.refined(scan, plane));
         self.revolutions += 1;
 
         let (plane, origin) = match (found, self.last) {
@@ -170,16 +180,48 @@ impl Ground {
         }
     }
 
+    /// The plane fitted to all returns near it, again and again.
+    fn refined(&mut self, scan: &Scan, plane: Plane) -> Plane {
+        /// Refinement moves the plane by less than this many inlier distances.
+        const WIDER: f64 = 3.0;
+        let near_m = self.parameters.inlier_distance_m;
+        self.gather_near(scan, &plane, WIDER * near_m);
+        (0..self.parameters.refinements).fold(plane, |plane, _| {
+            let points = self.near.iter().copied();
+            let close = points.filter(|point| libm::fabs(plane.above_m(point)) <= near_m);
+            Plane::fit(close).unwrap_or(plane)
+        })
+    }
+
+    /// Notes the returns within a distance of the plane and within the candidates' range.
+    fn gather_near(&mut self, scan: &Scan, plane: &Plane, near_m: f64) {
+        self.near.clear();
+        if self.parameters.refinements == 0 {
+            return;
+        }
+        let far_squared = (self.parameters.candidate_range_m.powi(2)) as f32;
+        let (near_m, above_m) = (near_m as f32, plane.heights());
+        let (x_m, y_m, z_m) = (scan.x_m(), scan.y_m(), scan.z_m());
+        for point in 0..scan.len() {
+            let [x, y, z] = [x_m[point], y_m[point], z_m[point]];
+            let wanted = above_m(x, y, z).abs() <= near_m
+                && x * x + y * y <= far_squared
+                && scan.has_return(point);
+            if wanted {
+                self.near.push(Vector3::new(x, y, z).map(f64::from));
+            }
+        }
+    }
+
     fn mark(&mut self, scan: &Scan, plane: &Plane) -> usize {
-        let [a, b, c] = plane.normal().map(|component| component as f32);
-        let height_m = plane.height_m() as f32;
+        let height_m = plane.heights();
         let near_m = self.parameters.mark_distance_m as f32;
         let per_m = self.parameters.mark_distance_per_m as f32;
         let below = self.parameters.below_is_ground;
         let (range_m, x_m, y_m, z_m) = (scan.range_m(), scan.x_m(), scan.y_m(), scan.z_m());
         self.mask.clear();
         self.mask.extend((0..scan.len()).map(|point| {
-            let above_m = a * x_m[point] + b * y_m[point] + c * z_m[point] + height_m;
+            let above_m = height_m(x_m[point], y_m[point], z_m[point]);
             let limit_m = near_m + per_m * range_m[point];
             range_m[point] > 0.0 && above_m <= limit_m && (below || above_m >= -limit_m)
         }));

@@ -73,6 +73,13 @@ impl Plane {
         self.normal.dot(point) + self.height_m
     }
 
+    /// The height of points above the plane, in the precision of the scan.
+    pub(super) fn heights(&self) -> impl Fn(f32, f32, f32) -> f32 + use<> {
+        let [a, b, c] = self.normal().map(|component| component as f32);
+        let height_m = self.height_m as f32;
+        move |x, y, z| a * x + b * y + c * z + height_m
+    }
+
     /// Height of the sensor above the plane.
     pub fn height_m(&self) -> f64 {
         self.height_m

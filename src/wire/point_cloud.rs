@@ -30,10 +30,11 @@ pub struct CompactPointCloud<'a> {
 }
 
 /// Fields 6 and 7 in the meaning of the schema that the sender uses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Schema<'a> {
     /// Neither field: OpenDLV up to v0.9.1, whose VLP-16 service is the most common sender,
     /// and OpenDaVINCI before 4.6.0.
+    #[default]
     Bare,
     /// OpenDaVINCI since 4.6.0.
     OpenDaVinci {
@@ -105,12 +106,6 @@ impl Schema<'_> {
             },
             (Self::Bare, None) => Self::Bare,
         }
-    }
-}
-
-impl Default for Schema<'_> {
-    fn default() -> Self {
-        Self::Bare
     }
 }
 
