@@ -11,6 +11,7 @@ mod common;
 
 use std::io::Read as _;
 use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
+use std::os::unix::process::CommandExt as _;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -20,7 +21,7 @@ use kreisel::simulate::{Simulation, scenario};
 use kreisel::wire::object_list::ObjectList;
 use kreisel::wire::status::Status;
 use kreisel::wire::{Envelope, Message, Recording};
-use nix::sys::signal::{Signal, kill};
+use nix::sys::signal::{Signal, killpg};
 use nix::unistd::Pid;
 
 const CID: u8 = 111;
@@ -56,7 +57,8 @@ fn enter_namespace() -> bool {
         && ip("route add 225.0.0.0/24 dev lo src 127.0.0.1")
 }
 
-/// A command that ends with the test.
+/// A command that ends with the test, and what it has started itself: libcluon's tools come in
+/// a wrapper.
 struct Running(Child);
 
 impl Running {
@@ -65,7 +67,8 @@ impl Running {
         command
             .args(arguments)
             .stdout(Stdio::piped())
-            .stderr(Stdio::piped());
+            .stderr(Stdio::piped())
+            .process_group(0);
         Self(command.spawn().unwrap())
     }
 
@@ -84,7 +87,7 @@ impl Running {
     }
 
     fn signal(&self, signal: Signal) {
-        kill(Pid::from_raw(self.0.id() as i32), signal).unwrap();
+        killpg(Pid::from_raw(self.0.id() as i32), signal).unwrap();
     }
 
     /// What it printed, once it has ended.
@@ -113,7 +116,7 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        let _ = self.0.kill();
+        let _ = killpg(Pid::from_raw(self.0.id() as i32), Signal::SIGKILL);
         let _ = self.0.wait();
     }
 }

@@ -132,10 +132,9 @@ impl Dbscan {
     /// How many neighbours a point has, itself included; counting stops at `needed`. Most
     /// points on a surface have enough among the next few of their own layer.
     fn neighbours_up_to(&self, centre: &Centre, needed: u32) -> u32 {
-        let own = self.reach(centre, centre.layer).unwrap_or(0);
-        let next_few = own.min(needed as usize);
+        let next_few = self.windows.clipped(needed as usize);
         let found = self.count(centre, centre.layer, next_few);
-        if found >= needed || next_few == 0 {
+        if found >= needed {
             return found;
         }
         let mut found = 0;
@@ -224,7 +223,7 @@ impl Dbscan {
                     let other_first = scan.index(candidate.columns.start, other) as u32;
                     if !too_far
                         && partition.find(first) != partition.find(other_first)
-                        && self.touch(scan, (layer, run), (other, candidate))
+                        && self.touch(scan, (layer, run), (other, candidate), reach)
                     {
                         partition.join(first, other_first);
                     }
@@ -233,15 +232,18 @@ impl Dbscan {
         }
     }
 
-    /// Whether any core point of one run is a neighbour of any of the other.
-    fn touch(&self, scan: &Scan, (layer, run): (usize, &Run), other: (usize, &Run)) -> bool {
-        let (other_layer, other) = other;
+    /// Whether any core point of one run is a neighbour of any of the other, `reach` columns
+    /// off at most.
+    fn touch(
+        &self,
+        scan: &Scan,
+        (layer, run): (usize, &Run),
+        (other_layer, other): (usize, &Run),
+        reach: usize,
+    ) -> bool {
         let core = |layer: usize| move |column: &usize| self.core[scan.index(*column, layer)];
         run.columns.clone().filter(core(layer)).any(|column| {
             let centre = self.centre(scan, scan.index(column, layer));
-            let Some(reach) = self.reach(&centre, other_layer) else {
-                return false;
-            };
             let row = &self.rows[other_layer];
             let stretches = self.windows.stretches(column, reach, reach);
             stretches.into_iter().any(|stretch| {
@@ -257,9 +259,8 @@ impl Dbscan {
 
     /// Whether the point in a column is a neighbour of a point and in its window.
     fn sees(&self, centre: &Centre, layer: usize, column: usize) -> bool {
-        self.reach(centre, layer)
-            .is_some_and(|reach| centre.column.abs_diff(column) <= reach)
-            && self.rows[layer].is_neighbour(column, centre)
+        let apart = centre.column.abs_diff(column);
+        self.windows.clipped(apart) == apart && self.rows[layer].is_neighbour(column, centre)
     }
 
     /// Numbers clusters by their first core point.

@@ -84,6 +84,14 @@ impl Windows {
         Some(reach.min(self.columns / 2))
     }
 
+    /// So many columns, as far as neighbours so far off count at all: to an exact window all do.
+    pub(super) fn clipped(&self, columns: usize) -> usize {
+        match self.setting {
+            WindowSetting::Exact => columns,
+            WindowSetting::Columns => columns.min(self.fixed_columns),
+        }
+    }
+
     /// The columns within `reach` of any of `columns`.
     pub(super) fn around(&self, columns: &Range<usize>, reach: usize) -> [Range<usize>; 2] {
         self.stretches(columns.start, reach, columns.len() - 1 + reach)

@@ -45,11 +45,14 @@ impl Plane {
     /// mean, so that d vanishes and a 2 x 2 system is left, solved by Cramer's rule; then the
     /// Hesse form from n = (a, b, 1) and the mean. `None` without points.
     pub fn fit(points: impl Iterator<Item = Vector3<f64>> + Clone) -> Option<Self> {
-        let count = points.clone().count();
+        let nothing = (0usize, Vector3::zeros());
+        let (count, sum) = points
+            .clone()
+            .fold(nothing, |(count, sum), point| (count + 1, sum + point));
         if count == 0 {
             return None;
         }
-        let mean = points.clone().sum::<Vector3<f64>>() / count as f64;
+        let mean = sum / count as f64;
         let [mut xx, mut xy, mut yy, mut xz, mut yz] = [0.0; 5];
         for point in points {
             let p = point - mean;
