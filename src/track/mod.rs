@@ -51,6 +51,8 @@ parameters! {
 /// Size of the car whose hidden part is assumed: the average of new cars in Europe.
 const CAR_LENGTH_M: f64 = 4.3;
 const CAR_WIDTH_M: f64 = 1.8;
+/// Longer than any bicycle: what moves and shows so long a side is a car.
+const LONGEST_CYCLE_M: f64 = 2.1;
 /// Visible sides between these are taken for the width of a vehicle...
 const VEHICLE_WIDTH_M: std::ops::RangeInclusive<f64> = 1.3..=2.6;
 /// ...and heights between these for its height.
@@ -357,20 +359,12 @@ fn floor_below(ground: &Plane, [x, y]: [f64; 2]) -> f64 {
 /// A box that shows one or two sides of a vehicle, grown to a whole car away from the sensor.
 /// A moving one has its length along the motion; of a standing one a visible side as long as
 /// a vehicle is wide is its front or rear.
-/// A cabin sits in the middle of its car and grows to all sides.
+/// A cabin sits in the middle of its car's length.
 fn completed(seen: Rectangle, heading_rad: Option<f64>, is_cabin: bool) -> Rectangle {
     let is_wide = |across_m: f64| VEHICLE_WIDTH_M.contains(&across_m);
-    let to_car = |seen: Rectangle| {
-        let car = seen.grown(CAR_LENGTH_M, CAR_WIDTH_M);
-        let centre_m = if is_cabin {
-            seen.centre_m
-        } else {
-            car.centre_m
-        };
-        Rectangle { centre_m, ..car }
-    };
+    let to_car = |seen: Rectangle| seen.grown(CAR_LENGTH_M, CAR_WIDTH_M, is_cabin);
     if heading_rad.is_some() {
-        let side_view = seen.length_m > *VEHICLE_WIDTH_M.end();
+        let side_view = seen.length_m > LONGEST_CYCLE_M;
         return if is_wide(seen.width_m) || side_view {
             to_car(seen)
         } else {

@@ -93,7 +93,8 @@ impl Rectangle {
     }
 
     /// At least so long and so wide, grown away from the sensor: the edges that it sees stay.
-    pub fn grown(self, length_m: f64, width_m: f64) -> Self {
+    /// With `from_middle` the length grows to both ends.
+    pub(super) fn grown(self, length_m: f64, width_m: f64, from_middle: bool) -> Self {
         let (sine, cosine) = libm::sincos(self.yaw_rad);
         let [x, y] = self.centre_m;
         let (along_m, across_m) = (x * cosine + y * sine, y * cosine - x * sine);
@@ -103,6 +104,7 @@ impl Rectangle {
             let side = (offset_m / (0.5 * size_m).max(NEAREST_M)).clamp(-1.0, 1.0);
             (size_m + added_m, 0.5 * added_m * side)
         };
+        let along_m = if from_middle { 0.0 } else { along_m };
         let (length_m, du) = grow(self.length_m, length_m, along_m);
         let (width_m, dv) = grow(self.width_m, width_m, across_m);
         Self {
@@ -210,7 +212,7 @@ mod tests {
             length_m: 0.2,
             width_m: 1.8,
         };
-        let grown = seen.grown(4.2, 1.8);
+        let grown = seen.grown(4.2, 1.8, false);
         assert_eq!((grown.length_m, grown.width_m), (4.2, 1.8));
         assert!((grown.centre_m[0] - 12.0).abs() < 1e-9);
         assert!(grown.centre_m[1].abs() < 1e-9);
