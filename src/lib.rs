@@ -32,8 +32,11 @@ pub mod publish;
 // The steps above, in order.
 pub mod pipeline;
 
-// What a user may set, with unit and range, and the two profiles.
+// What a user may set: all stages' parameters.
 pub mod config;
+
+// How a stage declares its parameters: unit, range, two profiles.
+pub mod parameter;
 
 // Counters by name.
 pub mod tally;

@@ -1,6 +1,6 @@
 //! Last step: objects become messages, and messages the frames that are sent.
 
-use crate::config::{choices, parameters};
+use crate::parameter::{choices, parameters};
 use crate::time::{Span, Time};
 use crate::track::Object;
 use crate::wire::envelope::Postmark;
@@ -270,7 +270,7 @@ impl Sight {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Profile;
+    use crate::parameter::Profile;
     use crate::wire::Envelope;
     use crate::wire::frame::MAX_DATAGRAM_LEN;
 

@@ -7,7 +7,8 @@ mod common;
 
 use kreisel::cloud::{Intake, Scan};
 use kreisel::cluster::{ClusterParameters, Clusters, Dbscan};
-use kreisel::config::{Configuration, Profile};
+use kreisel::config::Configuration;
+use kreisel::parameter::Profile;
 use kreisel::random::Random;
 use kreisel::wire::Envelope;
 use kreisel::wire::point_cloud::CompactPointCloud;

@@ -6,7 +6,8 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 
 use super::Completion;
-use crate::config::{Configuration, Profile, text};
+use crate::config::{Configuration, text};
+use crate::parameter::Profile;
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {

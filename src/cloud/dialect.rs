@@ -130,7 +130,7 @@ fn unit_m(cloud: &CompactPointCloud<'_>, setting: UnitSetting) -> Option<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Profile;
+    use crate::parameter::Profile;
 
     fn distances(order: ByteOrder) -> Vec<u8> {
         (0..32u16)

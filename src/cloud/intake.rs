@@ -376,7 +376,7 @@ fn is_whole_turn(cloud: &CompactPointCloud<'_>, step_deg: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Profile;
+    use crate::parameter::Profile;
     use crate::wire::TimeStamp;
 
     struct Sender {

@@ -19,7 +19,7 @@ pub use dialect::{ByteOrderSource, Dialect, shown_order};
 pub use intake::{Intake, Refusal, Revolution};
 pub use scan::{CAPACITY, MASKED, MAX_COLUMNS, MAX_LAYERS, Scan};
 
-use crate::config::{choices, parameters};
+use crate::parameter::{choices, parameters};
 
 choices! {
     /// How the order of the two bytes of a distance is decided.

@@ -217,7 +217,7 @@ impl Scan {
 pub(crate) mod tests {
     use super::*;
     use crate::cloud::{ByteOrderSource, Dialect};
-    use crate::config::Profile;
+    use crate::parameter::Profile;
     use crate::wire::point_cloud::{ByteOrder, CompactPointCloud};
 
     /// A scan of centimetres, `columns` around the circle.

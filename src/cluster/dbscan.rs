@@ -390,7 +390,7 @@ impl Row {
 mod tests {
     use super::*;
     use crate::cloud::tests::scan_of;
-    use crate::config::Profile;
+    use crate::parameter::Profile;
 
     fn cluster(scan: &Scan, profile: Profile) -> Clusters {
         let ground = vec![false; scan.len()];

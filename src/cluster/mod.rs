@@ -15,7 +15,7 @@ mod window;
 
 pub use dbscan::Dbscan;
 
-use crate::config::{choices, parameters};
+use crate::parameter::{choices, parameters};
 
 choices! {
     /// Where neighbours of a point are looked for.

@@ -119,7 +119,7 @@ impl Windows {
 mod tests {
     use super::*;
     use crate::cloud::tests::scan_of;
-    use crate::config::Profile;
+    use crate::parameter::Profile;
 
     fn windows(columns: usize, profile: Profile) -> Windows {
         let mut windows = Windows::new(&ClusterParameters::profile(profile));

@@ -1,17 +1,12 @@
-//! What a user may set. Each stage declares its parameters once, with both profiles' values,
-//! range, unit and meaning (`parameters!`); printing, reading and checking follow from that.
-
-mod parameter;
+//! What a user may set: the parameters of all stages together, and their text form.
 
 #[cfg(feature = "shell")]
 pub mod text;
 
-pub use parameter::{Description, Domain, Problem, Profile, Section, Setting, Value, parse};
-pub(crate) use parameter::{choices, parameters};
-
 use crate::cloud::CloudParameters;
 use crate::cluster::ClusterParameters;
 use crate::ground::GroundParameters;
+use crate::parameter::{Profile, Section, parameters};
 use crate::publish::PublishParameters;
 use crate::track::TrackParameters;
 
@@ -101,6 +96,7 @@ impl Default for Configuration {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::parameter::Value;
 
     #[test]
     fn both_profiles_lie_within_every_range() {

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 
 use toml::de::{DeTable, DeValue};
 
-use super::{Configuration, Problem, Profile, Value};
+use super::Configuration;
+use crate::parameter::{Problem, Profile, Value};
 
 /// What is wrong with a configuration file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -15,7 +15,7 @@ pub use plane::Plane;
 use nalgebra::Vector3;
 
 use crate::cloud::Scan;
-use crate::config::{choices, parameters};
+use crate::parameter::{choices, parameters};
 use crate::random::Random;
 use minima::Minima;
 
@@ -234,7 +234,7 @@ mod tests {
     use super::*;
     use crate::cloud::sensor::VLP16;
     use crate::cloud::tests::scan_of;
-    use crate::config::Profile;
+    use crate::parameter::Profile;
 
     /// Centimetres to a plane at `height_m`, tilted by `tilt_deg` towards forward.
     fn tilted_road(height_m: f64, tilt_deg: f64) -> Scan {

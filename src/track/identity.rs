@@ -130,7 +130,7 @@ impl Identities {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Profile;
+    use crate::parameter::Profile;
 
     struct Scene {
         identities: Identities,

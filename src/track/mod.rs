@@ -13,8 +13,8 @@ pub use rectangle::Rectangle;
 
 use crate::cloud::Scan;
 use crate::cluster::Clusters;
-use crate::config::parameters;
 use crate::ground::Plane;
+use crate::parameter::parameters;
 use crate::time::Time;
 use identity::Identities;
 use motion::Motion;
@@ -386,7 +386,7 @@ mod tests {
     use crate::cloud::sensor::VLP16;
     use crate::cloud::tests::scan_of;
     use crate::cluster::{ClusterParameters, Dbscan};
-    use crate::config::Profile;
+    use crate::parameter::Profile;
 
     /// The rear of a car, 1.8 m wide and 1.2 m high, straight ahead.
     fn rear_of_car(distance_m: f64) -> Scan {

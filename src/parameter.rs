@@ -1,4 +1,5 @@
-//! The table form in which stages declare their parameters.
+//! The table form in which each stage declares its parameters once, with both profiles' values,
+//! range, unit and meaning. Printing, reading and checking follow from it.
 
 use std::fmt;
 
@@ -286,8 +287,8 @@ macro_rules! parameters {
         impl $name {
             /// The values of a built-in profile.
             #[allow(unused_mut, unused_assignments, clippy::allow_attributes)]
-            pub fn profile(profile: $crate::config::Profile) -> Self {
-                let thesis = profile == $crate::config::Profile::Thesis;
+            pub fn profile(profile: $crate::parameter::Profile) -> Self {
+                let thesis = profile == $crate::parameter::Profile::Thesis;
                 Self {
                     $( $field: {
                         let mut value: $type = $default;
@@ -299,7 +300,7 @@ macro_rules! parameters {
             }
         }
 
-        impl $crate::config::Section for $name {
+        impl $crate::parameter::Section for $name {
             fn name(&self) -> &'static str {
                 $section
             }
@@ -308,33 +309,33 @@ macro_rules! parameters {
                 &[$($section_doc),*]
             }
 
-            fn descriptions(&self) -> Vec<$crate::config::Description> {
-                vec![$( $crate::config::Description {
+            fn descriptions(&self) -> Vec<$crate::parameter::Description> {
+                vec![$( $crate::parameter::Description {
                     key: stringify!($field),
                     meaning: &[$($doc),*],
                     unit: $unit,
-                    domain: <$type as $crate::config::Setting>::domain(
-                        $crate::config::parameters!(@bounds $($low, $high)?)
+                    domain: <$type as $crate::parameter::Setting>::domain(
+                        $crate::parameter::parameters!(@bounds $($low, $high)?)
                     ),
                 }, )*]
             }
 
-            fn get(&self, index: usize) -> $crate::config::Value {
-                [$( $crate::config::Setting::to_value(&self.$field), )*][index].clone()
+            fn get(&self, index: usize) -> $crate::parameter::Value {
+                [$( $crate::parameter::Setting::to_value(&self.$field), )*][index].clone()
             }
 
             #[allow(unused_assignments, clippy::allow_attributes)]
             fn set(
                 &mut self,
                 index: usize,
-                value: $crate::config::Value,
-            ) -> Result<(), $crate::config::Problem> {
+                value: $crate::parameter::Value,
+            ) -> Result<(), $crate::parameter::Problem> {
                 let mut position = 0;
                 $(
                     if index == position {
-                        self.$field = $crate::config::parse(
+                        self.$field = $crate::parameter::parse(
                             value,
-                            $crate::config::parameters!(@bounds $($low, $high)?),
+                            $crate::parameter::parameters!(@bounds $($low, $high)?),
                             $unit,
                         )?;
                         return Ok(());
@@ -360,19 +361,19 @@ macro_rules! choices {
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub enum $name { $( $(#[$variant_meta])* $variant, )* }
 
-        impl $crate::config::Setting for $name {
-            fn domain(_bounds: Option<(f64, f64)>) -> $crate::config::Domain {
-                $crate::config::Domain::Choice(&[$($word),*])
+        impl $crate::parameter::Setting for $name {
+            fn domain(_bounds: Option<(f64, f64)>) -> $crate::parameter::Domain {
+                $crate::parameter::Domain::Choice(&[$($word),*])
             }
 
-            fn to_value(&self) -> $crate::config::Value {
+            fn to_value(&self) -> $crate::parameter::Value {
                 let word = match self { $( Self::$variant => $word, )* };
-                $crate::config::Value::Text(word.into())
+                $crate::parameter::Value::Text(word.into())
             }
 
-            fn from_value(value: &$crate::config::Value) -> Option<Self> {
+            fn from_value(value: &$crate::parameter::Value) -> Option<Self> {
                 match value {
-                    $crate::config::Value::Text(word) => match word.as_str() {
+                    $crate::parameter::Value::Text(word) => match word.as_str() {
                         $( $word => Some(Self::$variant), )*
                         _ => None,
                     },
