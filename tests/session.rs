@@ -321,6 +321,11 @@ fn hostile_datagrams(revolution: &[u8]) -> Vec<Vec<u8>> {
         cloud(16, 2001, 0),
         cloud(16, 1800, 99),
     ];
+    // No libcluon listens in this namespace; one of these would end it.
+    if let Some(folder) = common::data("edge") {
+        let files = std::fs::read_dir(folder).unwrap();
+        datagrams.extend(files.map(|file| std::fs::read(file.unwrap().path()).unwrap()));
+    }
     let mut random = Random::new(5);
     datagrams.extend((0..2000).map(|_| {
         let mut mutated = revolution.to_vec();

@@ -2,11 +2,13 @@
 //!
 //! `dialect` finds what the message does not say (byte order) and what it says in two ways
 //! (intensity, unit). `intake` decides whether the message is one whole revolution that the
-//! array can hold, and says why not. `scan` is the array. `sensor` has the elevation tables.
+//! array can hold, `refusal` says why not. `scan` is the array. `sensor` has the elevation tables.
 
 mod dialect;
 
 mod intake;
+
+mod refusal;
 
 mod scan;
 
@@ -16,7 +18,8 @@ pub(crate) use scan::tests;
 pub mod sensor;
 
 pub use dialect::{ByteOrderSource, Dialect, shown_order};
-pub use intake::{Intake, Refusal, Revolution};
+pub use intake::{Intake, Revolution};
+pub use refusal::Refusal;
 pub use scan::{CAPACITY, MASKED, MAX_COLUMNS, MAX_LAYERS, Scan};
 
 use crate::parameter::{choices, parameters};
