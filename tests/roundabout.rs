@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use kreisel::config::Configuration;
+use kreisel::parameter::Profile;
 use kreisel::pipeline::{Outcome, Pipeline};
 use kreisel::simulate::scenario::{self, Class};
 use kreisel::simulate::{Simulation, TrueObject};
@@ -27,9 +28,9 @@ fn distance_m(object: &Object, truth: &TrueObject) -> f64 {
 }
 
 /// Errors and ids of every road user in view, revolution by revolution.
-fn drive(seed: u64, revolutions: usize) -> BTreeMap<u32, (Class, Record)> {
+fn drive(profile: Profile, seed: u64, revolutions: usize) -> BTreeMap<u32, (Class, Record)> {
     let mut simulation = Simulation::new(scenario::find("roundabout").unwrap(), seed);
-    let mut pipeline = Pipeline::new(&Configuration::default(), 0);
+    let mut pipeline = Pipeline::new(&Configuration::profile(profile), 0);
     let mut records: BTreeMap<u32, (Class, Record)> = BTreeMap::new();
     for _ in 0..revolutions {
         let mut frame = vec![];
@@ -58,7 +59,7 @@ fn drive(seed: u64, revolutions: usize) -> BTreeMap<u32, (Class, Record)> {
 #[test]
 fn every_road_user_in_view_is_listed_within_a_metre_under_one_id() {
     for seed in [11, 12, 13] {
-        for (user, (class, mut record)) in drive(seed, 100) {
+        for (user, (class, mut record)) in drive(Profile::Default, seed, 100) {
             let count = record.errors_m.len();
             assert!(
                 count > 20,
@@ -82,5 +83,26 @@ fn every_road_user_in_view_is_listed_within_a_metre_under_one_id() {
             assert!(median_m < 0.6, "seed {seed}, {class:?} {user}: {median_m}");
             assert!(most_m < 1.0, "seed {seed}, {class:?} {user}: {most_m}");
         }
+    }
+}
+
+#[test]
+fn the_thesis_profile_sees_the_same_road_users_and_changes_their_ids() {
+    for (user, (class, mut record)) in drive(Profile::Thesis, 11, 100) {
+        let count = record.errors_m.len();
+        record.ids.dedup();
+        record.errors_m.sort_by(f64::total_cmp);
+        let (median_m, most_m) = (
+            record.errors_m[count / 2],
+            record.errors_m[count * 95 / 100],
+        );
+        let ids = record.ids.len();
+        println!(
+            "thesis {class:?} {user}: {ids} ids, median {median_m:.2} m, 95th percentile {most_m:.2} m"
+        );
+        assert!(
+            class == Class::Pedestrian || ids > 1,
+            "{class:?} {user}: {ids} ids"
+        );
     }
 }

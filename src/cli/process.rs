@@ -156,7 +156,7 @@ impl Process<'_> {
         if let Some(labels) = self.labels {
             labels.finish()?;
         }
-        let status = self.pipeline.status();
+        let (status, counts) = (self.pipeline.status(), self.pipeline.counts());
         println!(
             "{} point clouds: {} answered, {} refused, {} damaged; {damages} damaged stretches",
             status.revolutions_received,
@@ -170,6 +170,24 @@ impl Process<'_> {
                 self.arguments.input.display(),
                 self.faults
             );
+        }
+        for (count, what) in [
+            (
+                counts.ground_held,
+                "without a plausible ground plane: the last one was kept",
+            ),
+            (
+                counts.ground_fallback,
+                "before any plausible ground plane: it was taken level at the configured height",
+            ),
+            (counts.time_jumps, "after a jump in time: tracks began anew"),
+        ] {
+            if count > 0 {
+                eprintln!(
+                    "kreisel: {}: {count} revolutions {what}",
+                    self.arguments.input.display()
+                );
+            }
         }
         let all_refused = status.revolutions_received > 0 && status.revolutions_published == 0;
         if damages > 0 || status.datagrams_damaged > 0 || all_refused {
