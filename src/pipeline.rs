@@ -155,8 +155,8 @@ impl Pipeline {
     /// Takes one envelope.
     ///
     /// # Errors
-    /// [`Fault`] when it is damaged or refused. It is counted, and nothing else changes: the
-    /// next good envelope is handled as if the bad one had not come.
+    /// [`Fault`] when it is damaged or refused. It is counted, and no track, plane or map hears
+    /// of it; what the intake remembers of it costs the next good ones at most one.
     pub fn handle(&mut self, envelope: &Envelope<'_>) -> Result<Outcome, Fault> {
         let outcome = self.dispatch(envelope);
         if let Err(fault) = &outcome {

@@ -12,7 +12,14 @@ pub struct Tally {
 impl Tally {
     /// Counts one more.
     pub fn count(&mut self, name: &'static str) {
-        *self.counts.entry(name).or_default() += 1;
+        self.count_many(name, 1);
+    }
+
+    /// Counts several more.
+    pub fn count_many(&mut self, name: &'static str, more: u64) {
+        if more > 0 {
+            *self.counts.entry(name).or_default() += more;
+        }
     }
 
     /// How often `name` was counted.
@@ -33,7 +40,7 @@ impl Tally {
     /// Adds another tally to this one.
     pub fn add(&mut self, other: &Self) {
         for (name, count) in other.iter() {
-            *self.counts.entry(name).or_default() += count;
+            self.count_many(name, count);
         }
     }
 }

@@ -40,7 +40,8 @@ struct Captured<'a> {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let bytes = files::read(&arguments.input)?;
-    let mut output = Output::create(&arguments.output)?;
+    files::check_distinct(&arguments.input, &[Some(&arguments.output)])?;
+    let mut output = None;
     let mut conversion = Conversion::default();
     let bar = progress(bytes.len(), "bytes");
     let damage = walk(&bytes, |offset, captured| {
@@ -48,13 +49,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
         conversion.take(arguments, &captured, &mut output)
     })?;
     bar.finish_and_clear();
-    output.finish()?;
+    output.map_or(Ok(()), Output::finish)?;
     let path = arguments.input.display();
     if conversion.packets == 0 {
         let problem = damage.unwrap_or_else(|| "byte 0: no VLP-16 data packets".into());
         bail!("{path}: {problem}");
     }
-    println!(
+    say!(
         "{} packets, {} revolutions; {} columns after the last one not sent",
         conversion.packets,
         conversion.revolutions,
@@ -62,9 +63,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     );
     conversion.warn(&arguments.input);
     match damage {
+        None if conversion.broken + conversion.cut > 0 => Ok(Completion::Damaged),
         None => Ok(Completion::Done),
         Some(problem) => {
-            eprintln!("kreisel: {path}: {problem}; the rest is skipped");
+            tell!("kreisel: {path}: {problem}; the rest is skipped");
             Ok(Completion::Damaged)
         }
     }
@@ -78,6 +80,7 @@ struct Conversion {
     revolutions: u64,
     other_sources: u64,
     broken: u64,
+    cut: u64,
     dual_returns: u64,
     frame: Vec<u8>,
 }
@@ -87,11 +90,15 @@ impl Conversion {
         &mut self,
         arguments: &Arguments,
         captured: &Captured<'_>,
-        output: &mut Output,
+        output: &mut Option<Output>,
     ) -> Result<()> {
         const RETURN_MODE_AT: usize = 1204;
         const DUAL_RETURN: u8 = 0x39;
-        let Some((source, payload)) = udp(captured) else {
+        let Ok(found) = udp(captured) else {
+            self.cut += 1;
+            return Ok(());
+        };
+        let Some((source, payload)) = found else {
             return Ok(());
         };
         if payload.len() != PACKET_LEN {
@@ -100,6 +107,9 @@ impl Conversion {
         if *self.source.get_or_insert_with(|| source.clone()) != source {
             self.other_sources += 1;
             return Ok(());
+        }
+        if output.is_none() {
+            *output = Some(Output::create(&arguments.output)?);
         }
         self.packets += 1;
         self.dual_returns += u64::from(payload[RETURN_MODE_AT] == DUAL_RETURN);
@@ -118,7 +128,9 @@ impl Conversion {
             postmark.put_payload(&mut self.frame, POINT_CLOUD_ID, |out| {
                 sweep.cloud().encode(out)
             });
-            output.put(&self.frame)?;
+            if let Some(output) = output {
+                output.put(&self.frame)?;
+            }
             self.revolutions += 1;
         }
         Ok(())
@@ -129,13 +141,14 @@ impl Conversion {
         for (count, what) in [
             (self.other_sources, "packets of other sensors left out"),
             (self.broken, "packets without block flags left out"),
+            (self.cut, "packets that are no whole frames left out"),
             (
                 self.dual_returns,
                 "packets in dual return mode, which the device service takes for more columns",
             ),
         ] {
             if count > 0 {
-                eprintln!("kreisel: {path}: {count} {what}");
+                tell!("kreisel: {path}: {count} {what}");
             }
         }
     }
@@ -241,24 +254,23 @@ fn micros(ticks: u64, resolution: u8) -> Option<i64> {
     i64::try_from(u128::from(ticks) * 1_000_000 / per_second).ok()
 }
 
-/// Source and payload of a UDP packet.
-fn udp<'a>(captured: &Captured<'a>) -> Option<(Vec<u8>, &'a [u8])> {
+/// Source and payload, if it is a UDP packet; an error if it is cut or damaged.
+fn udp<'a>(captured: &Captured<'a>) -> Result<Option<(Vec<u8>, &'a [u8])>> {
     let packet = match captured.link {
-        Linktype::ETHERNET => SlicedPacket::from_ethernet(captured.bytes),
-        Linktype::LINUX_SLL => SlicedPacket::from_linux_sll(captured.bytes),
-        Linktype::RAW | Linktype::IPV4 => SlicedPacket::from_ip(captured.bytes),
-        _ => return None,
-    }
-    .ok()?;
+        Linktype::ETHERNET => SlicedPacket::from_ethernet(captured.bytes)?,
+        Linktype::LINUX_SLL => SlicedPacket::from_linux_sll(captured.bytes)?,
+        Linktype::RAW | Linktype::IPV4 => SlicedPacket::from_ip(captured.bytes)?,
+        _ => return Ok(None),
+    };
     let source = match &packet.net {
         Some(etherparse::NetSlice::Ipv4(ip)) => ip.header().source().to_vec(),
         Some(etherparse::NetSlice::Ipv6(ip)) => ip.header().source().to_vec(),
-        _ => return None,
+        _ => return Ok(None),
     };
-    match packet.transport? {
-        TransportSlice::Udp(udp) => Some((source, udp.payload())),
+    Ok(match packet.transport {
+        Some(TransportSlice::Udp(udp)) => Some((source, udp.payload())),
         _ => None,
-    }
+    })
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::config::{Configuration, text};
@@ -22,6 +22,19 @@ pub(super) fn configuration(path: Option<&Path>) -> Result<Configuration> {
     };
     let content = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
     text::parse(&content).with_context(|| path.display().to_string())
+}
+
+/// Refuses to write over what is read.
+pub(super) fn check_distinct(input: &Path, outputs: &[Option<&PathBuf>]) -> Result<()> {
+    let Ok(input) = input.canonicalize() else {
+        return Ok(());
+    };
+    for output in outputs.iter().copied().flatten() {
+        if output.canonicalize().is_ok_and(|output| output == input) {
+            bail!("{}: is the input, and would be lost", output.display());
+        }
+    }
+    Ok(())
 }
 
 /// A file that is written, whose errors name it.
@@ -82,7 +95,7 @@ pub(super) fn progress(length: usize, unit: &str) -> ProgressBar {
 
 /// Says what is damaged in a file, in one line.
 pub(super) fn report_damage(path: &Path, damage: &Damage) {
-    eprintln!(
+    tell!(
         "kreisel: {}: {}; {} bytes skipped",
         path.display(),
         damage.error,

@@ -82,13 +82,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let bytes = files::read(&arguments.input)?;
     let report = inspect(&bytes);
     if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&report)?);
+        say!("{}", serde_json::to_string_pretty(&report)?);
     } else {
-        print(&report);
+        print(&report)?;
     }
     for damage in &report.damage {
         let (path, problem) = (arguments.input.display(), &damage.problem);
-        eprintln!(
+        tell!(
             "kreisel: {path}: {problem}; {} bytes skipped",
             damage.skipped
         );
@@ -198,17 +198,24 @@ impl Report {
     }
 }
 
-fn print(report: &Report) {
-    println!(
+fn print(report: &Report) -> Result<()> {
+    say!(
         "{} bytes, {} envelopes, {:.3} s",
-        report.bytes, report.envelopes, report.duration_s
+        report.bytes,
+        report.envelopes,
+        report.duration_s
     );
-    println!(
+    say!(
         "{:>6} {:>10} {:>7} {:>11} {:>8} {:>8}  message",
-        "id", "sender", "count", "bytes", "Hz", "gap s"
+        "id",
+        "sender",
+        "count",
+        "bytes",
+        "Hz",
+        "gap s"
     );
     for message in &report.messages {
-        println!(
+        say!(
             "{:>6} {:>10} {:>7} {:>11} {:>8.2} {:>8.3}  {}",
             message.id,
             message.sender_stamp,
@@ -220,7 +227,7 @@ fn print(report: &Report) {
         );
     }
     for cloud in report.point_clouds.iter().take(MOST_CLOUD_LINES) {
-        println!(
+        say!(
             "byte {}: {} ({}), {} x {}, {:.3} to {:.3} degrees, {}, {} bits of intensity{}",
             cloud.offset,
             cloud.sensor,
@@ -244,12 +251,13 @@ fn print(report: &Report) {
         .filter(|cloud| cloud.refused.is_some())
         .count();
     if more > 0 {
-        println!("and {more} more point clouds");
+        say!("and {more} more point clouds");
     }
     if !report.point_clouds.is_empty() {
-        println!(
+        say!(
             "{} point clouds, {refused} refused",
             report.point_clouds.len()
         );
     }
+    Ok(())
 }

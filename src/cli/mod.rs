@@ -1,5 +1,21 @@
 //! The command line: one file a command. What goes wrong is said here, once, in one line.
 
+/// Prints a line of results; an error when nobody can read it.
+macro_rules! say {
+    ($($argument:tt)*) => {{
+        use std::io::Write as _;
+        writeln!(std::io::stdout().lock(), $($argument)*)?
+    }};
+}
+
+/// Prints a line of diagnostics, if anybody can read it.
+macro_rules! tell {
+    ($($argument:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr().lock(), $($argument)*);
+    }};
+}
+
 mod config;
 
 mod convert;
@@ -122,7 +138,7 @@ pub fn main() -> ExitCode {
         // Who reads our output has seen enough.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("kreisel: {error:#}");
+            tell!("kreisel: {error:#}");
             ExitCode::FAILURE
         }
     }

@@ -54,6 +54,8 @@ struct Process<'a> {
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let configuration = files::configuration(arguments.config.as_deref())?;
     let bytes = files::read(&arguments.input)?;
+    let outputs = [&arguments.output, &arguments.objects, &arguments.labels];
+    files::check_distinct(&arguments.input, &outputs.map(Option::as_ref))?;
     let mut process = Process {
         arguments,
         pipeline: Pipeline::new(&configuration, arguments.id),
@@ -102,7 +104,7 @@ impl Process<'_> {
     fn report(&mut self, offset: usize, envelope: &Envelope<'_>, fault: &Fault) {
         self.faults.count(fault.name());
         if self.faults.get(fault.name()) == 1 {
-            eprintln!(
+            tell!(
                 "kreisel: {}: byte {offset}: message {}: {}: {fault}",
                 self.arguments.input.display(),
                 envelope.data_type,
@@ -157,15 +159,15 @@ impl Process<'_> {
             labels.finish()?;
         }
         let (status, counts) = (self.pipeline.status(), self.pipeline.counts());
-        println!(
-            "{} point clouds: {} answered, {} refused, {} damaged; {damages} damaged stretches",
+        say!(
+            "{} point clouds: {} answered, {} refused; {} damaged messages, {damages} damaged stretches",
             status.revolutions_received,
             status.revolutions_published,
             status.revolutions_refused,
             status.datagrams_damaged,
         );
         if self.faults.total() > 0 {
-            eprintln!(
+            tell!(
                 "kreisel: {}: {}",
                 self.arguments.input.display(),
                 self.faults
@@ -183,7 +185,7 @@ impl Process<'_> {
             (counts.time_jumps, "after a jump in time: tracks began anew"),
         ] {
             if count > 0 {
-                eprintln!(
+                tell!(
                     "kreisel: {}: {count} revolutions {what}",
                     self.arguments.input.display()
                 );

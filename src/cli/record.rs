@@ -21,23 +21,25 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
-    let mut output = Output::create(&arguments.output)?;
-    let (written, damaged) = block_on(record(arguments, &mut output))?;
-    output.finish()?;
-    eprintln!("kreisel: {written} envelopes written, {damaged} damaged datagrams left out");
+    let (written, damaged) = block_on(record(arguments))?;
+    tell!("kreisel: {written} envelopes written, {damaged} damaged datagrams left out");
     Ok(Completion::Done)
 }
 
-async fn record(arguments: &Arguments, output: &mut Output) -> Result<(u64, u64)> {
+async fn record(arguments: &Arguments) -> Result<(u64, u64)> {
     let parameters = Configuration::default().session;
     let (mut receiver, _sender) = arguments.session.session().join(&parameters)?;
+    let mut output = Output::create(&arguments.output)?;
     tracing::info!("recording {}; Ctrl-C ends it", receiver.group());
     let mut stop = pin!(stop_signal());
     let (mut written, mut damaged, mut lost) = (0, 0, 0);
     loop {
         let (datagram, arrival) = tokio::select! {
             received = receiver.receive() => received?,
-            () = &mut stop => return Ok((written, damaged)),
+            () = &mut stop => {
+                output.finish()?;
+                return Ok((written, damaged));
+            }
         };
         if arrival.kernel_dropped > lost {
             lost = arrival.kernel_dropped;

@@ -23,7 +23,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     session: SessionArguments,
     /// Times as fast as recorded.
-    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive)]
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
     speed: f64,
     /// Begin again at the end.
     #[arg(long = "loop")]
@@ -40,10 +40,10 @@ const SEED: u64 = 1;
 /// recording or a time stamp from elsewhere.
 const LONGEST_PAUSE_S: f64 = 1.0;
 
-fn positive(text: &str) -> Result<f64, String> {
+fn speed(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
-        _ => Err("not a number above 0".into()),
+        Ok(speed) if (0.001..=1000.0).contains(&speed) => Ok(speed),
+        _ => Err("not a number from 0.001 to 1000".into()),
     }
 }
 
@@ -79,7 +79,7 @@ fn replay(arguments: &Arguments) -> Result<Completion> {
         match item {
             Ok(entry) if entry.frame.len() > MAX_DATAGRAM_LEN => {
                 let (path, length) = (arguments.input.display(), entry.frame.len());
-                eprintln!(
+                tell!(
                     "kreisel: {path}: byte {}: {length} bytes do not fit a datagram; skipped",
                     entry.offset
                 );

@@ -85,7 +85,7 @@ pub(super) async fn send(
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     if arguments.list {
         for scenario in scenario::all() {
-            println!("{}: {}", scenario.name, scenario.summary);
+            say!("{}: {}", scenario.name, scenario.summary);
         }
         return Ok(Completion::Done);
     }

@@ -30,17 +30,21 @@ pub struct Revolution<'a> {
 /// time that is taken for disorder rather than for a recording that begins again.
 const CONTINUITY: Span = Span::from_micros(1_000_000);
 
-/// Messages in a row from one other sender after which it is followed, too. The first sender
-/// is always welcome back.
+/// Messages in a row from other senders after which the one that sent the last is followed.
+/// The first sender is always welcome back.
 const SENDER_PATIENCE: u32 = 20;
 
 /// Keeps what must be known from message to message. A hostile or damaged message that passes
-/// for a sound one must not cost the sound ones after it more than one of them.
+/// for a sound one costs the sound ones after it at most one of them, unless it is the very
+/// first and names another sender.
 #[derive(Debug, Clone, Default)]
 pub struct Intake {
     detector: DialectDetector,
+    /// The first sender.
+    home: Option<u32>,
     listened: Option<u32>,
-    stranger: Option<(u32, u32)>,
+    /// Messages from others since the last one that was listened to.
+    others: u32,
     last_time: Option<Time>,
     /// Time of a message that was refused as out of order, if it was the last one.
     late_time: Option<Time>,
@@ -72,6 +76,7 @@ impl Intake {
         let (time, time_jumped) = self.check_time(envelope, &cloud, sensor)?;
         let dialect = self.detector.dialect(&cloud, parameters).ok_or(unknown)?;
         self.last_time = Some(time);
+        self.home.get_or_insert(envelope.sender_stamp);
         self.listened.get_or_insert(envelope.sender_stamp);
         Ok(Revolution {
             cloud,
@@ -91,22 +96,18 @@ impl Intake {
     ) -> Result<(), Refusal> {
         let configured = u32::try_from(parameters.sender_stamp).ok();
         let listened = configured.or(self.listened).unwrap_or(sender_stamp);
-        if sender_stamp == listened {
-            self.stranger = None;
-            return Ok(());
+        self.others += 1;
+        let is_home = configured.is_none() && self.home == Some(sender_stamp);
+        let patience_ends = configured.is_none() && self.others > SENDER_PATIENCE;
+        if sender_stamp != listened && !is_home && !patience_ends {
+            return Err(Refusal::OtherSender {
+                sender_stamp,
+                listened,
+            });
         }
-        let times = match self.stranger {
-            Some((stranger, times)) if stranger == sender_stamp => times + 1,
-            _ => 1,
-        };
-        self.stranger = Some((sender_stamp, times));
-        if configured.is_none() && times > SENDER_PATIENCE {
-            return Ok(());
-        }
-        Err(Refusal::OtherSender {
-            sender_stamp,
-            listened,
-        })
+        self.others = 0;
+        self.listened = self.listened.map(|_| sender_stamp);
+        Ok(())
     }
 
     /// First azimuth and step. First and last column are given, those between are linear.
@@ -457,6 +458,30 @@ mod tests {
         assert_eq!(taken, 10);
         assert!(send(3, 4_200_000));
         assert!(!send(4, 4_300_000));
+    }
+
+    #[test]
+    fn of_two_other_senders_one_is_followed_when_the_first_is_silent() {
+        let mut sender = Sender::new();
+        let distances = [1; 32 * 1800];
+        let mut send = |stamp: u32, tenths: i64| {
+            let cloud = CompactPointCloud {
+                end_azimuth_deg: 359.8,
+                layers: 16,
+                distances: &distances,
+                ..CompactPointCloud::default()
+            };
+            let envelope = Envelope {
+                sender_stamp: stamp,
+                sample_time_stamp: TimeStamp::from(Time::from_micros(100_000 * tenths)),
+                ..Envelope::default()
+            };
+            let taken = sender.intake.accept(&envelope, cloud, &sender.parameters);
+            taken.is_ok()
+        };
+        assert!(send(3, 1));
+        let taken = (0..60).filter(|n| send(4 + (n % 2) as u32, 2 + n)).count();
+        assert_eq!(taken, 20);
     }
 
     #[test]

@@ -49,6 +49,9 @@ pub struct Options {
 /// How often Status is sent.
 const STATUS_PERIOD: Duration = Duration::from_secs(1);
 
+/// The longest pose message of any peer has 250 bytes; what is far longer is none.
+const LONGEST_POSE: usize = 4096;
+
 /// A shorter receive buffer is worth a warning.
 const COMFORTABLE_BUFFER_S: f64 = 2.0;
 
@@ -96,11 +99,17 @@ pub async fn run(options: Options, stop: impl Future<Output = ()>) -> Result<(),
         vitals,
         receive_buffer: receiver.buffer_bytes(),
     };
-    let worker = std::thread::spawn(move || worker.work());
+    let (at_work, gone) = tokio::sync::oneshot::channel::<()>();
+    let worker = std::thread::spawn(move || {
+        // Dropped when the thread ends, by a panic, too.
+        let _at_work = at_work;
+        worker.work();
+    });
     let result = tokio::select! {
         result = receive(&mut receiver, &queue, &intake) => result,
         () = tick(&queue) => Ok(()),
         () = health => Ok(()),
+        _ = gone => Err(SessionError::WorkerDied),
         () = stop => Ok(()),
     };
     queue.close();
@@ -178,8 +187,17 @@ fn sorted(
                 );
                 return None;
             }
+            let is_revolution = envelope.data_type == POINT_CLOUD_ID;
+            if !is_revolution && datagram.len() > LONGEST_POSE {
+                intake.damaged += 1;
+                intake.faults.count("pose_too_long");
+                log.note("pose_too_long", || {
+                    format!("{} bytes from {}", datagram.len(), arrival.source)
+                });
+                return None;
+            }
             Some(Item::Job(Job {
-                is_revolution: envelope.data_type == POINT_CLOUD_ID,
+                is_revolution,
                 datagram: Bytes::copy_from_slice(datagram),
                 arrival: arrival.time,
             }))

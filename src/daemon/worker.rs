@@ -102,7 +102,8 @@ impl Worker {
             .clone();
         let mut faults = self.pipeline.counts().faults.clone();
         faults.add(&intake.faults);
-        let (dropped_revolutions, _) = self.queue.dropped();
+        let (dropped_revolutions, dropped_others) = self.queue.dropped();
+        faults.count_many("queue_dropped_poses", dropped_others);
         let latency = diary.latency.percentiles();
         status.uptime = diary.start.elapsed().as_secs_f64();
         // Those that waited in vain were received, too.

@@ -156,7 +156,11 @@ impl Ground {
         let mut random = Random::new(self.parameters.seed as u64 ^ self.revolutions << 20);
         let near = followed.filter(|_| self.misses < self.parameters.follow_patience);
         let found = ransac::find(&self.minima, near.as_ref(), &self.parameters, &mut random);
-        let found = found.map(|plane| self.refined(scan, plane));
+        let found = found.map(|plane| {
+            let refined = self.refined(scan, plane);
+            let is_plausible = ransac::is_plausible(&refined, near.as_ref(), &self.parameters);
+            if is_plausible { refined } else { plane }
+        });
         self.revolutions += 1;
 
         let (plane, origin) = match (found, self.last) {

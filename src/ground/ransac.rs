@@ -65,7 +65,12 @@ fn draw(minima: &Minima, random: &mut Random) -> Option<[Vector3<f64>; 3]> {
     })
 }
 
-fn is_plausible(plane: &Plane, near: Option<&Plane>, parameters: &GroundParameters) -> bool {
+/// Whether a plane is within the configured heights and tilts, and near the last one.
+pub(super) fn is_plausible(
+    plane: &Plane,
+    near: Option<&Plane>,
+    parameters: &GroundParameters,
+) -> bool {
     let within = (parameters.height_low_m..=parameters.height_high_m).contains(&plane.height_m())
         && plane.tilt_rad() <= parameters.tilt_high_deg.to_radians();
     let follows = near.is_none_or(|last| {

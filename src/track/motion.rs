@@ -8,6 +8,9 @@ const MOVING_MPS: f64 = 0.8;
 /// Travel that shows a direction: noise of 0.1 m turns it by 5 degrees.
 const TRAVEL_M: f64 = 1.5;
 
+/// Over a shorter time a difference of positions is noise, whatever the time stamps say.
+const LEAST_PASSED_S: f64 = 0.02;
+
 /// Where an object was seen lately.
 #[derive(Debug, Clone)]
 pub(super) struct Motion {
@@ -96,7 +99,7 @@ impl Motion {
         }
         if let Some((then, from_m)) = self.positions.first() {
             let passed_s = (time - *then).seconds();
-            if passed_s > 0.0 {
+            if passed_s >= LEAST_PASSED_S {
                 self.velocity = Velocity {
                     mps: [0, 1].map(|axis| (position_m[axis] - from_m[axis]) / passed_s),
                     deviation_mps: std::f64::consts::SQRT_2 * CENTRE_DEVIATION_M / passed_s,

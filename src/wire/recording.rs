@@ -57,12 +57,18 @@ impl<'a> Recording<'a> {
         ))
     }
 
-    /// Whether a frame begins at `offset` that is sound and not an accident of two bytes: its
-    /// envelope decodes and it ends where the file ends or another frame begins.
+    /// Whether a frame begins at `offset` that is sound and not an accident of two bytes: no
+    /// longer than a datagram, beginning with the data type as every peer writes it, and ending
+    /// where the file ends or another frame begins. The cheap tests come first.
     fn resumes_at(&self, offset: usize) -> bool {
-        self.entry(offset).is_ok_and(|(_, end)| {
-            end == self.bytes.len() || self.bytes[end..].starts_with(&frame::MAGIC[..1])
-        })
+        const DATA_TYPE_KEY: u8 = 0x08;
+        let Ok((body, end)) = frame::split(self.bytes, offset) else {
+            return false;
+        };
+        body.len() <= frame::MAX_DATAGRAM_LEN
+            && body.first() == Some(&DATA_TYPE_KEY)
+            && (end == self.bytes.len() || self.bytes[end..].starts_with(&frame::MAGIC[..1]))
+            && self.entry(offset).is_ok()
     }
 
     fn skip(&mut self, error: WireError) -> Damage {
@@ -135,6 +141,12 @@ mod tests {
         let second = bytes.len() / 3;
         bytes.splice(second..second, *b"\x0dgarbage");
         assert_eq!(counts(&bytes), (3, 1, 8));
+    }
+
+    #[test]
+    fn bytes_that_look_like_frames_everywhere_do_not_take_for_ever() {
+        let bytes = b"\x0d\xa4\x03\x00\x04".repeat(200_000);
+        assert_eq!(counts(&bytes), (0, 1, bytes.len()));
     }
 
     #[test]
