@@ -79,6 +79,7 @@ impl fmt::Display for Domain {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Switch => write!(f, "true or false"),
+            Self::Whole(low, high) if *high >= i64::MAX as f64 => write!(f, "{low} or more"),
             Self::Whole(low, high) | Self::Real(low, high) => write!(f, "{low} to {high}"),
             Self::Choice(names) => write!(f, "{}", names.join(", ")),
         }
@@ -121,8 +122,8 @@ fn spaced(unit: &str) -> String {
 fn wanted(domain: &Domain, unit: &str) -> String {
     match domain {
         Domain::Switch => "true or false".into(),
-        Domain::Whole(..) => format!("a whole number from {domain}{}", spaced(unit)),
-        Domain::Real(..) => format!("a number from {domain}{}", spaced(unit)),
+        Domain::Whole(..) => format!("a whole number, {domain}{}", spaced(unit)),
+        Domain::Real(..) => format!("a number, {domain}{}", spaced(unit)),
         Domain::Choice(_) => format!("one of {domain}"),
     }
 }

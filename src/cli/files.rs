@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, anyhow, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::config::{Configuration, text};
@@ -20,7 +20,10 @@ pub(super) fn configuration(path: Option<&Path>) -> Result<Configuration> {
     let Some(path) = path else {
         return Ok(Configuration::default());
     };
-    let content = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    let content = String::from_utf8(read(path)?).map_err(|error| {
+        let byte = error.utf8_error().valid_up_to();
+        anyhow!("{}: byte {byte} is not UTF-8 text", path.display())
+    })?;
     text::parse(&content).with_context(|| path.display().to_string())
 }
 

@@ -131,7 +131,7 @@ mod tests {
         let problem = session.set(0, Value::Text("one".into())).unwrap_err();
         assert_eq!(
             problem.to_string(),
-            "\"one\" is not a whole number from 0 to 255 hops"
+            "\"one\" is not a whole number, 0 to 255 hops"
         );
     }
 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use toml::de::{DeTable, DeValue};
 
 use super::Configuration;
-use crate::parameter::{Problem, Profile, Value};
+use crate::parameter::{Problem, Profile, Section, Value};
 
 /// What is wrong with a configuration file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -29,6 +29,30 @@ pub enum ConfigError {
         name: String,
         /// What could have been.
         known: String,
+    },
+    /// A name of something else.
+    #[error("line {line}: \"{name}\" is a section, written [{name}], not a value")]
+    NotASection {
+        /// Counted from 1.
+        line: usize,
+        /// What was given a value.
+        name: String,
+    },
+    /// A lower bound above its upper one.
+    #[error("line {line}: {section}.{low_key} = {low} is above {section}.{high_key} = {high}")]
+    Contradiction {
+        /// Counted from 1; of the later one of the two.
+        line: usize,
+        /// Section of both.
+        section: &'static str,
+        /// Name of the lower bound.
+        low_key: &'static str,
+        /// Its value.
+        low: Value,
+        /// Name of the upper bound.
+        high_key: &'static str,
+        /// Its value.
+        high: Value,
     },
     /// A value that cannot be.
     #[error("line {line}: {section}.{key}: {problem}")]
@@ -124,12 +148,18 @@ fn read_section(
         .sections_mut()
         .into_iter()
         .find(|section| section.name() == name);
-    let (Some(section), DeValue::Table(table)) = (section, content) else {
+    let Some(section) = section else {
         return Err(ConfigError::Unknown {
             line,
             what: "section",
             name: name.into(),
             known: known.join(", "),
+        });
+    };
+    let DeValue::Table(table) = content else {
+        return Err(ConfigError::NotASection {
+            line,
+            name: name.into(),
         });
     };
     let descriptions = section.descriptions();
@@ -160,7 +190,49 @@ fn read_section(
                 problem,
             })?;
     }
-    Ok(())
+    let last_line = |keys: [&str; 2]| {
+        let given = keys.into_iter().filter_map(|key| table.get_key_value(key));
+        given
+            .map(|(key, _)| line_of(text, key.span().start))
+            .max()
+            .unwrap_or(line)
+    };
+    match inverted_bounds(section) {
+        None => Ok(()),
+        Some([low, high]) => Err(ConfigError::Contradiction {
+            line: last_line([descriptions[low].key, descriptions[high].key]),
+            section: section.name(),
+            low_key: descriptions[low].key,
+            low: section.get(low),
+            high_key: descriptions[high].key,
+            high: section.get(high),
+        }),
+    }
+}
+
+/// Two parameters of which one is called low or minimum and the other high or maximum, and the
+/// same otherwise, whose values are the wrong way round.
+fn inverted_bounds(section: &dyn Section) -> Option<[usize; 2]> {
+    let descriptions = section.descriptions();
+    let number = |index| match section.get(index) {
+        Value::Real(value) => value,
+        Value::Integer(value) => value as f64,
+        Value::Bool(_) | Value::Text(_) => f64::NAN,
+    };
+    descriptions
+        .iter()
+        .enumerate()
+        .find_map(|(low, parameter)| {
+            let upper = parameter
+                .key
+                .replace("_low_", "_high_")
+                .replace("minimum_", "maximum_");
+            let high = descriptions
+                .iter()
+                .position(|other| other.key == upper)
+                .filter(|high| *high != low)?;
+            (number(low) > number(high)).then_some([low, high])
+        })
 }
 
 /// A TOML value in our terms; what no parameter can be becomes a word that says so.
@@ -234,6 +306,29 @@ mod tests {
         );
         let error = parse("profile = \"fast\"").unwrap_err().to_string();
         assert!(error.contains("there is no profile \"fast\""), "{error}");
+    }
+
+    #[test]
+    fn bounds_the_wrong_way_round_are_refused_where_the_second_is_given() {
+        let error = parse("[ground]\nheight_high_m = 1.0\n# low\nheight_low_m = 2\n").unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "line 4: ground.height_low_m = 2.0 is above ground.height_high_m = 1.0"
+        );
+        let error = parse("[cloud]\nminimum_range_m = 3\nmaximum_range_m = 2.0\n").unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "line 3: cloud.minimum_range_m = 3.0 is above cloud.maximum_range_m = 2.0"
+        );
+    }
+
+    #[test]
+    fn a_section_that_is_given_a_value_is_told_how_it_is_written() {
+        let error = parse("cloud = 3\n").unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "line 1: \"cloud\" is a section, written [cloud], not a value"
+        );
     }
 
     #[test]
