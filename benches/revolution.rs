@@ -14,6 +14,7 @@ use std::time::Duration;
 use kreisel::cloud::{Intake, Scan};
 use kreisel::cluster::Dbscan;
 use kreisel::config::Configuration;
+use kreisel::ego::Sweep;
 use kreisel::ground::Ground;
 use kreisel::pipeline::{Outcome, Pipeline};
 use kreisel::simulate::{Simulation, scenario};
@@ -79,7 +80,7 @@ fn real() -> Option<Vec<Vec<u8>>> {
 }
 
 fn simulated() -> Vec<Vec<u8>> {
-    let mut simulation = Simulation::new(scenario::find("roundabout").unwrap(), 1);
+    let mut simulation = Simulation::new(scenario::find("roundabout-waiting").unwrap(), 1);
     let mut revolve = || {
         let mut frame = vec![];
         simulation.revolve(&mut frame);
@@ -150,10 +151,10 @@ fn bench(name: &str, frames: &[Vec<u8>], rounds: usize, unit_us: f64) {
         }),
     );
     let mut ground = Ground::new(&configuration.ground);
-    let mut plane = ground.process(&scan).plane;
+    let mut report = ground.process(&scan);
     row(
         "ground",
-        measure(rounds, |_| plane = ground.process(black_box(&scan)).plane),
+        measure(rounds, |_| report = ground.process(black_box(&scan))),
     );
     let mut dbscan = Dbscan::new(&configuration.cluster);
     row(
@@ -163,10 +164,18 @@ fn bench(name: &str, frames: &[Vec<u8>], rounds: usize, unit_us: f64) {
         }),
     );
     let mut tracker = Tracker::new(&configuration.track);
+    let sweep = Sweep::still(0);
     row(
         "track",
         measure(rounds, |_| {
-            tracker.process(black_box(&scan), dbscan.clusters(), &plane);
+            let heights_m = ground.heights_m();
+            tracker.process(
+                black_box(&scan),
+                dbscan.clusters(),
+                heights_m,
+                &report,
+                &sweep,
+            );
         }),
     );
 

@@ -17,6 +17,9 @@ pub mod wire;
 // A message to the static array of points.
 pub mod cloud;
 
+// Where the vehicle was meanwhile.
+pub mod ego;
+
 // Which points are ground.
 pub mod ground;
 

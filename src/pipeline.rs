@@ -3,10 +3,11 @@
 use crate::cloud::{Dialect, Intake, Refusal, Revolution, Scan};
 use crate::cluster::Dbscan;
 use crate::config::Configuration;
+use crate::ego::{Ego, Heard, Pose, Sweep};
 use crate::ground::{Ground, GroundReport, Origin};
 use crate::publish::{Heading, Publisher};
 use crate::tally::Tally;
-use crate::time::Time;
+use crate::time::{Span, Time};
 use crate::track::{Object, Tracker};
 use crate::wire::point_cloud::{CompactPointCloud, POINT_CLOUD_ID};
 use crate::wire::status::Status;
@@ -36,6 +37,8 @@ pub struct Pipeline {
     configuration: Configuration,
     intake: Intake,
     scan: Scan,
+    ego: Ego,
+    sweep: Sweep,
     ground: Ground,
     clusters: Dbscan,
     tracker: Tracker,
@@ -78,6 +81,8 @@ pub struct RevolutionReport {
     pub returns: usize,
     /// The ground.
     pub ground: GroundReport,
+    /// Where the vehicle is, if that is known.
+    pub vehicle: Option<Pose>,
     /// Clusters that were found.
     pub clusters: usize,
     /// Objects to be published.
@@ -98,6 +103,12 @@ pub enum Fault {
     /// A point cloud that is no whole revolution, or that the array cannot hold.
     #[error("point cloud refused: {0}")]
     Refused(#[from] Refusal),
+    /// A pose whose numbers cannot be a vehicle's on the earth.
+    #[error("message {data_type}: its numbers are no pose on the earth")]
+    ImplausiblePose {
+        /// The envelope's data type.
+        data_type: i32,
+    },
 }
 
 impl Fault {
@@ -106,6 +117,7 @@ impl Fault {
         match self {
             Self::Damaged { error, .. } => error.name(),
             Self::Refused(refusal) => refusal.name(),
+            Self::ImplausiblePose { .. } => "pose_implausible",
         }
     }
 }
@@ -137,6 +149,8 @@ impl Pipeline {
         Self {
             intake: Intake::default(),
             scan: Scan::default(),
+            ego: Ego::new(&configuration.ego),
+            sweep: Sweep::still(0),
             ground: Ground::new(&configuration.ground),
             clusters: Dbscan::new(&configuration.cluster),
             tracker: Tracker::new(&configuration.track),
@@ -163,7 +177,9 @@ impl Pipeline {
             self.counts.faults.count(fault.name());
             match fault {
                 Fault::Refused(_) => self.counts.refused += 1,
-                Fault::Damaged { .. } => self.counts.damaged += 1,
+                Fault::Damaged { .. } | Fault::ImplausiblePose { .. } => {
+                    self.counts.damaged += 1;
+                }
             }
         }
         outcome
@@ -186,11 +202,16 @@ impl Pipeline {
         if OWN_IDS.contains(&envelope.data_type) {
             return Ok(Outcome::Own);
         }
-        if is_pose(envelope).map_err(damaged)? {
-            self.counts.poses += 1;
-            return Ok(Outcome::Pose);
+        match self.ego.hear(envelope).map_err(damaged)? {
+            Heard::Nothing => Ok(Outcome::Other),
+            Heard::Implausible => Err(Fault::ImplausiblePose {
+                data_type: envelope.data_type,
+            }),
+            Heard::Pose => {
+                self.counts.poses += 1;
+                Ok(Outcome::Pose)
+            }
         }
-        Ok(Outcome::Other)
     }
 
     /// One revolution through all the steps.
@@ -200,9 +221,15 @@ impl Pipeline {
             self.tracker.reset();
         }
         self.scan.fill(revolution, &self.configuration.cloud);
+        let swept = Span::from_seconds(-self.scan.duration_s());
+        let sweep = self.ego.sweep(revolution.time + swept, revolution.time);
+        self.sweep = sweep;
         let ground = self.ground.process(&self.scan);
         let clusters = self.clusters.process(&self.scan, self.ground.mask());
-        let objects = self.tracker.process(&self.scan, clusters, &ground.plane);
+        let heights_m = self.ground.heights_m();
+        let objects = self
+            .tracker
+            .process(&self.scan, clusters, heights_m, &ground, &sweep);
 
         let report = RevolutionReport {
             number: self.last.map_or(0, |last| last.number.wrapping_add(1)),
@@ -214,6 +241,7 @@ impl Pipeline {
             rotation_hz: revolution.step_deg.abs() / (360.0 * revolution.sensor.column_period_s),
             returns: self.scan.returns(),
             ground,
+            vehicle: sweep.vehicle,
             clusters: clusters.len(),
             objects: objects.len(),
         };
@@ -232,6 +260,7 @@ impl Pipeline {
                 time: last.time,
                 sent,
                 processing_s,
+                sweep: &self.sweep,
             };
             self.publisher.publish(&heading, self.tracker.objects());
         }
@@ -291,22 +320,5 @@ impl Pipeline {
             status.ground_tilt = last.ground.plane.tilt_rad() as f32;
         }
         status
-    }
-}
-
-/// Whether an envelope holds a pose, which is then checked to decode.
-fn is_pose(envelope: &Envelope<'_>) -> Result<bool, WireError> {
-    fn decodes<M: Message>(envelope: &Envelope<'_>) -> Result<bool, WireError> {
-        M::decode(envelope.payload, envelope.payload_offset).map(|_| true)
-    }
-    match envelope.data_type {
-        pose::ApplanixGroup1::ID => decodes::<pose::ApplanixGroup1>(envelope),
-        pose::GeodeticWgs84Reading::ID => decodes::<pose::GeodeticWgs84Reading>(envelope),
-        pose::GeodeticHeadingReading::ID => decodes::<pose::GeodeticHeadingReading>(envelope),
-        pose::GroundSpeedReading::ID => decodes::<pose::GroundSpeedReading>(envelope),
-        pose::AngularVelocityReading::ID => decodes::<pose::AngularVelocityReading>(envelope),
-        pose::Geolocation::ID => decodes::<pose::Geolocation>(envelope),
-        pose::SimulationFrame::ID => decodes::<pose::SimulationFrame>(envelope),
-        _ => Ok(false),
     }
 }

@@ -1,5 +1,6 @@
 //! Last step: objects become messages, and messages the frames that are sent.
 
+use crate::ego::{Pose, Sweep};
 use crate::parameter::{choices, parameters};
 use crate::time::{Span, Time};
 use crate::track::Object;
@@ -50,7 +51,7 @@ pub struct Publisher {
 
 /// What a revolution's messages say beside its objects.
 #[derive(Debug, Clone, Copy)]
-pub struct Heading {
+pub struct Heading<'a> {
     /// Number of the revolution.
     pub revolution: u32,
     /// End of its sweep.
@@ -59,6 +60,8 @@ pub struct Heading {
     pub sent: Time,
     /// From the envelope in to the list out.
     pub processing_s: f32,
+    /// Where the sensor and its vehicle were.
+    pub sweep: &'a Sweep,
 }
 
 impl Publisher {
@@ -81,10 +84,10 @@ impl Publisher {
     }
 
     /// Makes the frames of a revolution.
-    pub fn publish(&mut self, heading: &Heading, objects: &[Object]) {
+    pub fn publish(&mut self, heading: &Heading<'_>, objects: &[Object]) {
         self.bytes.clear();
         self.ends.clear();
-        let (kept, omitted) = nearest(objects, self.parameters.most_objects);
+        let (kept, omitted) = nearest(objects, self.parameters.most_objects, &heading.sweep.sensor);
         let postmark = Postmark {
             sent: heading.sent,
             sampled: heading.time,
@@ -98,7 +101,10 @@ impl Publisher {
         }
         if self.parameters.environment {
             let validity = Span::from_seconds(self.parameters.environment_validity_s);
-            self.put(&postmark, &environment_of(heading.time + validity, &kept));
+            self.put(
+                &postmark,
+                &environment_of(heading.time + validity, &kept, &heading.sweep.sensor),
+            );
         }
     }
 
@@ -107,7 +113,7 @@ impl Publisher {
         self.ends.push(self.bytes.len());
     }
 
-    fn put_opendlv(&mut self, postmark: &Postmark, heading: &Heading, objects: &[&Object]) {
+    fn put_opendlv(&mut self, postmark: &Postmark, heading: &Heading<'_>, objects: &[&Object]) {
         let object_frame_id = heading.revolution;
         self.put(postmark, &opendlv::ObjectFrameStart { object_frame_id });
         let unit = match self.parameters.opendlv_angles {
@@ -115,14 +121,14 @@ impl Publisher {
             AngleUnit::Radians => 1.0,
         };
         for object in objects {
-            let (object_id, sight) = (object.id, Sight::of(object));
-            let [x, y, z] = object.centre_m.map(|metres| metres as f32);
+            let (object_id, sight) = (object.id, Sight::of(object, &heading.sweep.sensor));
+            let [x, y, z] = sight.position_m.map(|metres| metres as f32);
             self.put(postmark, &opendlv::ObjectAnnouncement { object_id });
             self.put(
                 postmark,
                 &opendlv::ObjectType {
                     object_id,
-                    kind: UNCLASSIFIED,
+                    kind: object.class.number(),
                 },
             );
             self.put(
@@ -155,14 +161,11 @@ impl Publisher {
     }
 }
 
-/// The class of an object that nobody has classified.
-const UNCLASSIFIED: u32 = 0;
-
 /// The objects that a list has room for, in their order, and how many it has none for.
-fn nearest(objects: &[Object], most: usize) -> (Vec<&Object>, usize) {
+fn nearest<'a>(objects: &'a [Object], most: usize, sensor: &Pose) -> (Vec<&'a Object>, usize) {
     let mut kept: Vec<&Object> = objects.iter().collect();
     if kept.len() > most {
-        let distance = |object: &Object| Sight::of(object).distance_m;
+        let distance = |object: &Object| Sight::of(object, sensor).distance_m;
         kept.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
         kept.truncate(most);
         kept.sort_by_key(|object| object.id);
@@ -171,39 +174,41 @@ fn nearest(objects: &[Object], most: usize) -> (Vec<&Object>, usize) {
     (kept, omitted)
 }
 
-fn object_list_of(heading: &Heading, objects: &[&Object], omitted: usize) -> ObjectList {
+fn object_list_of(heading: &Heading<'_>, objects: &[&Object], omitted: usize) -> ObjectList {
     let message = |object: &&Object| object_list::Object {
         object_id: object.id,
-        classification: UNCLASSIFIED,
-        class_probability: 0.0,
+        classification: object.class.number(),
+        class_probability: object.class_probability as f32,
         existence: object.existence as f32,
-        measured: true,
+        measured: object.measured,
         x: object.centre_m[0],
         y: object.centre_m[1],
         z: object.centre_m[2],
         yaw: object.yaw_rad as f32,
         speed: object.speed_mps as f32,
-        yaw_rate: 0.0,
+        yaw_rate: object.yaw_rate_radps as f32,
         acceleration: 0.0,
         length: object.length_m as f32,
         width: object.width_m as f32,
         height: object.height_m as f32,
-        x_deviation: object.position_deviation_m as f32,
-        y_deviation: object.position_deviation_m as f32,
+        x_deviation: object.position_deviation_m[0] as f32,
+        y_deviation: object.position_deviation_m[1] as f32,
         yaw_deviation: object.yaw_deviation_rad as f32,
         speed_deviation: object.speed_deviation_mps as f32,
         age: (heading.time - object.first_seen).seconds() as f32,
-        time_since_measurement: 0.0,
+        time_since_measurement: (heading.time - object.last_measured).seconds() as f32,
         number_of_points: object.points as u32,
     };
+    let vehicle = heading.sweep.vehicle;
+    let [ego_x, ego_y, ego_z] = vehicle.map_or([0.0; 3], |pose| pose.position_m);
     ObjectList {
         revolution: heading.revolution,
-        frame: 0,
-        ego_known: false,
-        ego_x: 0.0,
-        ego_y: 0.0,
-        ego_z: 0.0,
-        ego_yaw: 0.0,
+        frame: heading.sweep.frame.number(),
+        ego_known: vehicle.is_some(),
+        ego_x,
+        ego_y,
+        ego_z,
+        ego_yaw: vehicle.map_or(0.0, |pose| pose.yaw_rad) as f32,
         count: objects.len() as u32,
         omitted: omitted as u32,
         processing_time: heading.processing_s,
@@ -211,12 +216,12 @@ fn object_list_of(heading: &Heading, objects: &[&Object], omitted: usize) -> Obj
     }
 }
 
-fn environment_of(valid_until: Time, objects: &[&Object]) -> Environment {
+fn environment_of(valid_until: Time, objects: &[&Object], sensor: &Pose) -> Environment {
     let message = |object: &&Object| {
-        let sight = Sight::of(object);
+        let sight = Sight::of(object, sensor);
         PerceivedObject {
             identified: TimeStamp::from(object.first_seen),
-            kind: "unclassified".into(),
+            kind: object.class.name().into(),
             direction: Direction {
                 azimuth: sight.azimuth_rad as f32,
                 zenith: sight.zenith_rad as f32,
@@ -240,6 +245,8 @@ fn environment_of(valid_until: Time, objects: &[&Object]) -> Environment {
 
 /// An object as seen from the sensor, which looks along y.
 struct Sight {
+    /// In the sensor frame.
+    position_m: [f64; 3],
     azimuth_rad: f64,
     zenith_rad: f64,
     distance_m: f64,
@@ -248,16 +255,20 @@ struct Sight {
 }
 
 impl Sight {
-    fn of(object: &Object) -> Self {
-        let [x, y, z] = object.centre_m;
+    fn of(object: &Object, sensor: &Pose) -> Self {
+        let [east_m, north_m, up_m] = object.centre_m;
+        let [x, y] = sensor.placement().sensor_m([east_m, north_m]);
+        let z = up_m - sensor.position_m[2];
         let horizontal_m = libm::hypot(x, y);
         let distance_m = libm::hypot(horizontal_m, z);
         // How wide the box appears: its shadow across the line of sight.
-        let turn_rad = object.yaw_rad - libm::atan2(y, x);
+        let [sensor_x, sensor_y, _] = sensor.position_m;
+        let turn_rad = object.yaw_rad - libm::atan2(north_m - sensor_y, east_m - sensor_x);
         let across_m = object.length_m * libm::fabs(libm::sin(turn_rad))
             + object.width_m * libm::fabs(libm::cos(turn_rad));
         let seen_under = |size_m: f64| 2.0 * libm::atan2(0.5 * size_m, distance_m.max(0.1));
         Self {
+            position_m: [x, y, z],
             azimuth_rad: libm::atan2(-x, y),
             zenith_rad: libm::atan2(z, horizontal_m),
             distance_m,
@@ -271,19 +282,25 @@ impl Sight {
 mod tests {
     use super::*;
     use crate::parameter::Profile;
+    use crate::track::Class;
     use crate::wire::Envelope;
     use crate::wire::frame::MAX_DATAGRAM_LEN;
 
     fn object(id: u32, x: f64, y: f64) -> Object {
         Object {
             id,
+            class: Class::Cyclist,
+            class_probability: 0.9,
+            measured: true,
+            yaw_rate_radps: 0.1,
+            last_measured: Time::from_micros(1),
             centre_m: [x, y, -1.0],
             yaw_rad: 1.0,
             speed_mps: 3.0,
             length_m: 4.0,
             width_m: 2.0,
             height_m: 1.5,
-            position_deviation_m: 0.1,
+            position_deviation_m: [0.1; 2],
             yaw_deviation_rad: 0.1,
             speed_deviation_mps: 0.1,
             existence: 0.5,
@@ -292,8 +309,11 @@ mod tests {
         }
     }
 
-    fn heading() -> Heading {
+    const STILL: &Sweep = &Sweep::still(0);
+
+    fn heading() -> Heading<'static> {
         Heading {
+            sweep: STILL,
             revolution: 7,
             time: Time::from_micros(1_700_000_000_000_000),
             sent: Time::from_micros(1_700_000_000_010_000),
@@ -340,7 +360,7 @@ mod tests {
 
     #[test]
     fn an_object_to_the_left_has_a_positive_azimuth() {
-        let sight = Sight::of(&object(1, -5.0, 5.0));
+        let sight = Sight::of(&object(1, -5.0, 5.0), &Pose::SENSOR);
         assert!((sight.azimuth_rad.to_degrees() - 45.0).abs() < 1e-9);
         assert!(sight.zenith_rad < 0.0);
     }

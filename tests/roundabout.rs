@@ -1,4 +1,4 @@
-//! Accuracy on the simulated roundabout, against its truth.
+//! Accuracy on the simulated roundabout, against its truth, standing at an entry.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::collections::BTreeMap;
@@ -12,14 +12,25 @@ use kreisel::track::Object;
 use kreisel::wire::Envelope;
 
 /// Farther ones are not asked for.
-const REACH_M: f64 = 40.0;
-/// With fewer returns a road user is not in view.
-const LEAST_POINTS: usize = 5;
+const REACH_M: f64 = 30.0;
+/// With fewer returns a road user is hardly in view: at 30 m a car has 40.
+const LEAST_POINTS: usize = 20;
+/// Revolutions in view before it must be known, and out of view after which it may be forgotten.
+const SETTLING: usize = 5;
+/// Farther off is another object.
+const MATCH_M: f64 = 2.0;
 
+/// What became of a road user.
 #[derive(Debug, Default)]
 struct Record {
+    in_view: usize,
+    out_of_view: usize,
+    /// Revolutions in which it had to be known, and was not.
+    missed: usize,
     errors_m: Vec<f64>,
-    ids: Vec<u32>,
+    id: Option<u32>,
+    /// Changes of the id while it was in view.
+    changes: usize,
 }
 
 fn distance_m(object: &Object, truth: &TrueObject) -> f64 {
@@ -27,9 +38,48 @@ fn distance_m(object: &Object, truth: &TrueObject) -> f64 {
     (object.centre_m[0] - x).hypot(object.centre_m[1] - y)
 }
 
-/// Errors and ids of every road user in view, revolution by revolution.
+impl Record {
+    fn note(&mut self, user: &TrueObject, objects: &[Object]) {
+        let [x, y] = user.centre_m;
+        if x.hypot(y) > REACH_M || user.points < LEAST_POINTS {
+            self.out_of_view += 1;
+            self.in_view = 0;
+            return;
+        }
+        if self.out_of_view > SETTLING {
+            self.id = None;
+        }
+        self.out_of_view = 0;
+        self.in_view += 1;
+        if self.in_view <= SETTLING {
+            return;
+        }
+        let near = objects
+            .iter()
+            .map(|object| (distance_m(object, user), object.id));
+        let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0));
+        match nearest.filter(|(distance_m, _)| *distance_m < MATCH_M) {
+            None => self.missed += 1,
+            Some((distance_m, id)) => {
+                self.errors_m.push(distance_m);
+                self.changes += usize::from(self.id.is_some_and(|before| before != id));
+                self.id = Some(id);
+            }
+        }
+    }
+
+    /// Errors that half and 95 percent of the revolutions do not exceed.
+    fn errors_m(&mut self) -> (f64, f64) {
+        self.errors_m.sort_by(f64::total_cmp);
+        let count = self.errors_m.len();
+        (self.errors_m[count / 2], self.errors_m[count * 95 / 100])
+    }
+}
+
+/// What became of every road user in so many revolutions.
 fn drive(profile: Profile, seed: u64, revolutions: usize) -> BTreeMap<u32, (Class, Record)> {
-    let mut simulation = Simulation::new(scenario::find("roundabout").unwrap(), seed);
+    let scenario = scenario::find("roundabout-waiting").unwrap();
+    let mut simulation = Simulation::new(scenario, seed);
     let mut pipeline = Pipeline::new(&Configuration::profile(profile), 0);
     let mut records: BTreeMap<u32, (Class, Record)> = BTreeMap::new();
     for _ in 0..revolutions {
@@ -39,70 +89,49 @@ fn drive(profile: Profile, seed: u64, revolutions: usize) -> BTreeMap<u32, (Clas
         let outcome = pipeline.handle(&envelope);
         assert!(matches!(outcome, Ok(Outcome::Revolution(_))), "{outcome:?}");
         for user in &truth.objects {
-            let [x, y] = user.centre_m;
-            if x.hypot(y) > REACH_M || user.points < LEAST_POINTS {
-                continue;
-            }
-            let by_distance =
-                |a: &&Object, b: &&Object| distance_m(a, user).total_cmp(&distance_m(b, user));
-            let nearest = pipeline.objects().iter().min_by(by_distance).unwrap();
             let (_, record) = records
                 .entry(user.id)
                 .or_insert_with(|| (user.class, Record::default()));
-            record.errors_m.push(distance_m(nearest, user));
-            record.ids.push(nearest.id);
+            record.note(user, pipeline.objects());
         }
     }
+    records.retain(|_, (_, record)| record.errors_m.len() > 10);
     records
 }
 
 #[test]
 fn every_road_user_in_view_is_listed_within_a_metre_under_one_id() {
     for seed in [11, 12, 13] {
-        for (user, (class, mut record)) in drive(Profile::Default, seed, 100) {
-            let count = record.errors_m.len();
-            assert!(
-                count > 20,
-                "{class:?} {user} was in view {count} times only"
-            );
-            record.ids.dedup();
-            assert_eq!(
-                record.ids.len(),
-                1,
-                "seed {seed}, {class:?} {user}: {:?}",
-                record.ids
-            );
-            record.errors_m.sort_by(f64::total_cmp);
-            let (median_m, most_m) = (
-                record.errors_m[count / 2],
-                record.errors_m[count * 95 / 100],
-            );
+        let records = drive(Profile::Default, seed, 150);
+        assert!(records.len() >= 5, "{}", records.len());
+        for (user, (class, mut record)) in records {
+            let (median_m, most_m) = record.errors_m();
+            let Record {
+                missed, changes, ..
+            } = record;
             println!(
-                "seed {seed} {class:?} {user}: median {median_m:.2} m, 95th percentile {most_m:.2} m"
+                "seed {seed} {class:?} {user}: {} revolutions, {missed} missed, {changes} changes \
+                 of id, median {median_m:.2} m, 95th percentile {most_m:.2} m",
+                record.errors_m.len()
             );
-            assert!(median_m < 0.6, "seed {seed}, {class:?} {user}: {median_m}");
-            assert!(most_m < 1.0, "seed {seed}, {class:?} {user}: {most_m}");
+            assert!(median_m < 0.4 && most_m < 1.0, "{class:?} {user}");
+            assert!(missed * 50 <= record.errors_m.len(), "{class:?} {user}");
+            assert_eq!(changes, 0, "{class:?} {user}");
         }
     }
 }
 
 #[test]
 fn the_thesis_profile_sees_the_same_road_users_and_changes_their_ids() {
-    for (user, (class, mut record)) in drive(Profile::Thesis, 11, 100) {
-        let count = record.errors_m.len();
-        record.ids.dedup();
-        record.errors_m.sort_by(f64::total_cmp);
-        let (median_m, most_m) = (
-            record.errors_m[count / 2],
-            record.errors_m[count * 95 / 100],
-        );
-        let ids = record.ids.len();
+    let mut changes = 0;
+    for (user, (class, mut record)) in drive(Profile::Thesis, 11, 150) {
+        let (median_m, most_m) = record.errors_m();
         println!(
-            "thesis {class:?} {user}: {ids} ids, median {median_m:.2} m, 95th percentile {most_m:.2} m"
+            "thesis {class:?} {user}: {} missed, {} changes of id, median {median_m:.2} m, 95th \
+             percentile {most_m:.2} m",
+            record.missed, record.changes
         );
-        assert!(
-            class == Class::Pedestrian || ids > 1,
-            "{class:?} {user}: {ids} ids"
-        );
+        changes += record.changes;
     }
+    assert!(changes > 0);
 }

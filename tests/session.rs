@@ -186,7 +186,7 @@ impl Peer {
 }
 
 fn revolutions(count: usize) -> Vec<Vec<u8>> {
-    let mut simulation = Simulation::new(scenario::find("roundabout").unwrap(), 1);
+    let mut simulation = Simulation::new(scenario::find("roundabout-waiting").unwrap(), 1);
     let mut revolve = || {
         let mut frame = vec![];
         simulation.revolve(&mut frame);
@@ -231,7 +231,7 @@ fn what_libcluon_replays_is_answered_and_libcluon_decodes_the_answer() {
         let player = Running::start("cluon-replay", &["--cid=111", text(&recording)]);
         let last = peer.await_message::<ObjectList>(|list| list.revolution == 2);
         let status = peer.await_message::<Status>(|status| status.revolutions_published == 3);
-        assert!(last.count > 10);
+        assert!(last.count > 0);
         assert_eq!(status.faults, "first_azimuth=1");
         assert!((1.5..1.75).contains(&status.ground_height));
         assert_eq!(status.byte_order, "big-endian");

@@ -35,10 +35,20 @@ impl LabelWriter {
     }
 
     /// Adds the labels of the pipeline's last revolution.
-    pub(super) fn put(&mut self, pipeline: &Pipeline, revolution: u32) -> Result<()> {
-        let mut array = npy_header(pipeline.scan().columns());
-        for point in 0..pipeline.scan().len() {
-            array.extend_from_slice(&label(pipeline, point).to_le_bytes());
+    pub(super) fn put_perceived(&mut self, pipeline: &Pipeline, revolution: u32) -> Result<()> {
+        let labels = (0..pipeline.scan().len()).map(|point| label(pipeline, point));
+        self.put(labels, revolution)
+    }
+
+    /// Adds an array of labels, column by column.
+    pub(super) fn put(
+        &mut self,
+        labels: impl ExactSizeIterator<Item = i32>,
+        revolution: u32,
+    ) -> Result<()> {
+        let mut array = npy_header(labels.len() / MAX_LAYERS);
+        for label in labels {
+            array.extend_from_slice(&label.to_le_bytes());
         }
         let options = SimpleFileOptions::default();
         let name = format!("r{revolution:06}.npy");

@@ -11,8 +11,15 @@ use crate::track::Object;
 struct ObjectsLine<'a> {
     t: f64,
     revolution: u32,
-    ego: Option<()>,
+    ego: Option<EgoEntry>,
     objects: Vec<ObjectEntry<'a>>,
+}
+
+#[derive(Serialize)]
+struct EgoEntry {
+    x: f64,
+    y: f64,
+    yaw: f64,
 }
 
 #[derive(Serialize)]
@@ -69,29 +76,33 @@ struct TruthEntry<'a> {
 pub(super) fn line(report: &RevolutionReport, objects: &[Object]) -> Result<Vec<u8>> {
     let entry = |object: &Object| ObjectEntry {
         id: object.id,
-        class: "unclassified",
+        class: object.class.name(),
         x: object.centre_m[0],
         y: object.centre_m[1],
         z: object.centre_m[2],
         yaw: object.yaw_rad,
         v: object.speed_mps,
-        yaw_rate: 0.0,
+        yaw_rate: object.yaw_rate_radps,
         l: object.length_m,
         w: object.width_m,
         h: object.height_m,
         confidence: object.existence,
-        measured: true,
+        measured: object.measured,
         points: object.points,
     };
     with_newline(&ObjectsLine {
         t: report.time.seconds(),
         revolution: report.number,
-        ego: None,
+        ego: report.vehicle.map(|pose| EgoEntry {
+            x: pose.position_m[0],
+            y: pose.position_m[1],
+            yaw: pose.yaw_rad,
+        }),
         objects: objects.iter().map(entry).collect(),
     })
 }
 
-/// A revolution's truth. The sensor stands at the origin of the local frame and looks north.
+/// A revolution's truth.
 pub(super) fn truth_line(truth: &Truth) -> Result<Vec<u8>> {
     let entries = truth.objects.iter().map(|object| TruthEntry {
         id: object.id,
@@ -110,11 +121,11 @@ pub(super) fn truth_line(truth: &Truth) -> Result<Vec<u8>> {
     with_newline(&TruthLine {
         t: truth.time.seconds(),
         ego: TruthEgo {
-            x: 0.0,
-            y: 0.0,
-            z: 0.0,
-            yaw: std::f64::consts::FRAC_PI_2,
-            v: 0.0,
+            x: truth.sensor_m[0],
+            y: truth.sensor_m[1],
+            z: truth.sensor_m[2],
+            yaw: truth.sensor_yaw_rad,
+            v: truth.sensor_speed_mps,
         },
         objects: entries.collect(),
     })

@@ -124,7 +124,7 @@ impl Process<'_> {
             output.put(&objects::line(report, self.pipeline.objects())?)?;
         }
         if let Some(labels) = &mut self.labels {
-            labels.put(&self.pipeline, report.number)?;
+            labels.put_perceived(&self.pipeline, report.number)?;
         }
         Ok(())
     }

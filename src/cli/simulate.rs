@@ -8,10 +8,12 @@ use clap::Args;
 use tokio::time::{Instant, sleep_until};
 
 use super::files::{Output, progress};
+use super::labels::LabelWriter;
 use super::{Completion, objects};
 use crate::daemon::session::Sender;
 use crate::simulate::Simulation;
 use crate::simulate::scenario::{self, Scenario};
+use crate::wire::Recording;
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
@@ -33,6 +35,9 @@ pub(super) struct Arguments {
     /// Truth to write, one line of JSON a revolution.
     #[arg(long, value_name = "FILE.jsonl")]
     truth: Option<PathBuf>,
+    /// True labels of all points: 0 no return, 1 ground, 2 structure, 100 + n road user n.
+    #[arg(long, value_name = "FILE.npz")]
+    labels: Option<PathBuf>,
 }
 
 /// A day: longer ones are a slip of the pen.
@@ -69,7 +74,7 @@ pub(super) async fn send(
     speed: f64,
     sender: &Sender,
 ) -> Result<()> {
-    let mut simulation = Simulation::new(scenario.clone(), seed);
+    let mut simulation = Simulation::new(*scenario, seed);
     let period = Duration::from_secs_f64(1.0 / (ROTATION_HZ * speed));
     let mut frame = vec![];
     let mut due = Instant::now();
@@ -78,7 +83,9 @@ pub(super) async fn send(
         simulation.revolve(&mut frame);
         due += period;
         sleep_until(due).await;
-        sender.send(&frame)?;
+        for entry in Recording::new(&frame).flatten() {
+            sender.send(entry.frame)?;
+        }
     }
 }
 
@@ -94,21 +101,30 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     };
     let mut output = Output::create(path)?;
     let mut truth = Output::create_if(arguments.truth.as_deref())?;
+    let mut labels = arguments
+        .labels
+        .as_deref()
+        .map(LabelWriter::create)
+        .transpose()?;
     let revolutions = (arguments.duration * ROTATION_HZ).round().max(1.0) as usize;
     let bar = progress(revolutions, "revolutions");
-    let mut simulation = Simulation::new(scenario.clone(), arguments.seed);
+    let mut simulation = Simulation::new(*scenario, arguments.seed);
     let mut frame = vec![];
-    for _ in 0..revolutions {
+    for revolution in 0..revolutions {
         frame.clear();
         let was = simulation.revolve(&mut frame);
         output.put(&frame)?;
         if let Some(truth) = &mut truth {
             truth.put(&objects::truth_line(&was)?)?;
         }
+        if let Some(labels) = &mut labels {
+            labels.put(simulation.labels().iter().copied(), revolution as u32)?;
+        }
         bar.inc(1);
     }
     bar.finish_and_clear();
     output.finish()?;
     truth.map_or(Ok(()), Output::finish)?;
+    labels.map_or(Ok(()), LabelWriter::finish)?;
     Ok(Completion::Done)
 }

@@ -3,6 +3,7 @@
 use super::sensor::{self, Sensor};
 use super::{CloudParameters, Revolution};
 use crate::time::Time;
+use std::f64::consts::TAU;
 
 /// Columns that the array holds (thesis section 4.1.2: `Points[2000][16]`), enough for a
 /// sensor that turns at 9.05 Hz or faster.
@@ -25,6 +26,8 @@ pub struct Scan {
     time: Time,
     start_rad: f64,
     step_rad: f64,
+    /// Tangent and cosine of every layer's elevation.
+    slopes: [(f64, f64); MAX_LAYERS],
     range_m: Box<[f32]>,
     x_m: Box<[f32]>,
     y_m: Box<[f32]>,
@@ -40,6 +43,7 @@ impl Default for Scan {
             time: Time::ZERO,
             start_rad: 0.0,
             step_rad: 0.0,
+            slopes: [(0.0, 1.0); MAX_LAYERS],
             range_m: zeros(),
             x_m: zeros(),
             y_m: zeros(),
@@ -85,6 +89,10 @@ impl Scan {
         for (slot, degrees) in elevation.iter_mut().zip(self.sensor.elevation_deg) {
             let (sine, cosine) = libm::sincos(degrees.to_radians());
             *slot = (sine as f32, cosine as f32);
+        }
+        for (slope, degrees) in self.slopes.iter_mut().zip(self.sensor.elevation_deg) {
+            let (sine, cosine) = libm::sincos(degrees.to_radians());
+            *slope = (sine / cosine, cosine);
         }
         let (mut sine, mut cosine) = libm::sincos(self.start_rad);
         let (step_sine, step_cosine) = libm::sincos(self.step_rad);
@@ -145,6 +153,29 @@ impl Scan {
     /// From one column to the next in radians; negative when azimuths fall.
     pub fn step_rad(&self) -> f64 {
         self.step_rad
+    }
+
+    /// The column nearest to an azimuth.
+    pub fn column_at(&self, azimuth_rad: f64) -> usize {
+        let turn_rad = azimuth_rad - self.start_rad;
+        let turn_rad = turn_rad - TAU * libm::floor(turn_rad / TAU);
+        let column = libm::round(turn_rad / libm::fabs(self.step_rad).max(1e-9)) as usize;
+        let column = column.min(self.columns.saturating_sub(1));
+        if self.step_rad < 0.0 {
+            (self.columns - column) % self.columns.max(1)
+        } else {
+            column
+        }
+    }
+
+    /// Tangent and cosine of a layer's elevation.
+    pub fn slope(&self, layer: usize) -> (f64, f64) {
+        self.slopes[layer]
+    }
+
+    /// Seconds from the first column to the end of the sweep.
+    pub fn duration_s(&self) -> f64 {
+        self.columns as f64 * self.sensor.column_period_s
     }
 
     /// How long before the end of the sweep a column was measured, in seconds.

@@ -5,6 +5,7 @@ pub mod text;
 
 use crate::cloud::CloudParameters;
 use crate::cluster::ClusterParameters;
+use crate::ego::EgoParameters;
 use crate::ground::GroundParameters;
 use crate::parameter::{Profile, Section, parameters};
 use crate::publish::PublishParameters;
@@ -32,6 +33,8 @@ pub struct Configuration {
     pub profile: Profile,
     /// Step one behind the wire.
     pub cloud: CloudParameters,
+    /// Poses of the vehicle.
+    pub ego: EgoParameters,
     /// Ground plane.
     pub ground: GroundParameters,
     /// DBSCAN.
@@ -50,6 +53,7 @@ impl Configuration {
         Self {
             profile,
             cloud: CloudParameters::profile(profile),
+            ego: EgoParameters::profile(profile),
             ground: GroundParameters::profile(profile),
             cluster: ClusterParameters::profile(profile),
             track: TrackParameters::profile(profile),
@@ -59,31 +63,33 @@ impl Configuration {
     }
 
     /// The sections in the order in which a revolution meets them.
-    pub fn sections(&self) -> [&dyn Section; 6] {
+    pub fn sections(&self) -> [&dyn Section; 7] {
         let Self {
             profile: _,
             cloud,
+            ego,
             ground,
             cluster,
             track,
             publish,
             session,
         } = self;
-        [cloud, ground, cluster, track, publish, session]
+        [cloud, ego, ground, cluster, track, publish, session]
     }
 
     /// The same, to be set.
-    pub fn sections_mut(&mut self) -> [&mut dyn Section; 6] {
+    pub fn sections_mut(&mut self) -> [&mut dyn Section; 7] {
         let Self {
             profile: _,
             cloud,
+            ego,
             ground,
             cluster,
             track,
             publish,
             session,
         } = self;
-        [cloud, ground, cluster, track, publish, session]
+        [cloud, ego, ground, cluster, track, publish, session]
     }
 }
 

@@ -10,6 +10,8 @@ mod plane;
 
 mod ransac;
 
+mod surface;
+
 pub use plane::Plane;
 
 use nalgebra::Vector3;
@@ -18,6 +20,17 @@ use crate::cloud::Scan;
 use crate::parameter::{choices, parameters};
 use crate::random::Random;
 use minima::Minima;
+use surface::Surface;
+
+choices! {
+    /// What the ground is thought to be.
+    pub enum Model {
+        /// A plane, and heights above and below it that are followed outward.
+        Surface = "surface",
+        /// One plane.
+        Plane = "plane",
+    }
+}
 
 choices! {
     /// How the error of a candidate plane is summed.
@@ -33,6 +46,8 @@ choices! {
 parameters! {
     /// The ground plane: RANSAC over the lowest returns, refined by least squares.
     pub struct GroundParameters "ground" {
+        /// What the ground is thought to be.
+        model: Model = Model::Surface, thesis Model::Plane, "";
         /// Pie slices of the circle. In each the lowest returns are gathered, so that they do
         /// not all come from one place.
         segments: usize = 36, in 6..=360, "";
@@ -71,11 +86,11 @@ parameters! {
         refinements: usize = 3, thesis 0, in 0..=20, "";
         /// Height of the sensor that is taken when no plane was ever plausible.
         fallback_height_m: f64 = 1.9, thesis 2.05, in 0.1..=10.0, "m";
-        /// Distance to the plane within which a return is ground.
-        mark_distance_m: f64 = 0.2, thesis 0.5, in 0.01..=2.0, "m";
+        /// Distance to the ground within which a return belongs to it.
+        mark_distance_m: f64 = 0.13, thesis 0.5, in 0.01..=2.0, "m";
         /// What is added to that distance for each metre of range: a real road bends away
         /// from any plane.
-        mark_distance_per_m: f64 = 0.005, thesis 0.0, in 0.0..=0.1, "m/m";
+        mark_distance_per_m: f64 = 0.002, thesis 0.0, in 0.0..=0.1, "m/m";
         /// Whether everything below the plane is ground, too. It is no road user: it is a
         /// ditch, a slope, or a reflection in a wet road.
         below_is_ground: bool = true, thesis false, "";
@@ -121,7 +136,12 @@ pub struct Ground {
     /// Returns that the plane is refined with.
     near: Vec<Vector3<f64>>,
     mask: Vec<bool>,
+    surface: Surface,
+    heights_m: Vec<f32>,
 }
+
+/// Sectors in which the surface is followed, of 5 degrees each.
+const SECTORS: usize = 72;
 
 impl Ground {
     /// A ground step that knows nothing yet.
@@ -134,6 +154,8 @@ impl Ground {
             minima: Minima::new(parameters.segments, parameters.lowest_per_segment),
             near: Vec::with_capacity(crate::cloud::CAPACITY),
             mask: Vec::with_capacity(crate::cloud::CAPACITY),
+            surface: Surface::new(SECTORS),
+            heights_m: Vec::with_capacity(crate::cloud::CAPACITY),
         }
     }
 
@@ -145,6 +167,11 @@ impl Ground {
     /// Which points of the last revolution are ground.
     pub fn mask(&self) -> &[bool] {
         &self.mask
+    }
+
+    /// Heights of the points of the last revolution above the ground.
+    pub fn heights_m(&self) -> &[f32] {
+        &self.heights_m
     }
 
     /// Finds the plane of a revolution and marks its points.
@@ -223,9 +250,19 @@ impl Ground {
         let per_m = self.parameters.mark_distance_per_m as f32;
         let below = self.parameters.below_is_ground;
         let (range_m, x_m, y_m, z_m) = (scan.range_m(), scan.x_m(), scan.y_m(), scan.z_m());
+        self.heights_m.clear();
+        self.heights_m
+            .extend((0..scan.len()).map(|point| height_m(x_m[point], y_m[point], z_m[point])));
+        if self.parameters.model == Model::Surface {
+            self.surface.find(scan, plane);
+            for point in (0..scan.len()).filter(|point| range_m[*point] > 0.0) {
+                let distance_m = (x_m[point] * x_m[point] + y_m[point] * y_m[point]).sqrt();
+                self.heights_m[point] -= self.surface.level_m(scan.column(point), distance_m);
+            }
+        }
         self.mask.clear();
         self.mask.extend((0..scan.len()).map(|point| {
-            let above_m = height_m(x_m[point], y_m[point], z_m[point]);
+            let above_m = self.heights_m[point];
             let limit_m = near_m + per_m * range_m[point];
             range_m[point] > 0.0 && above_m <= limit_m && (below || above_m >= -limit_m)
         }));

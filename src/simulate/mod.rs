@@ -1,30 +1,60 @@
-//! A synthetic VLP-16 in a scene of simple solids, with the truth of every revolution.
+//! A synthetic VLP-16 that drives through a scene, with the truth of every revolution.
 //!
-//! `solid` has the geometry of rays, `scenario` the scenes, this file the sensor: columns one
-//! after the other, each at its own time, while the scene moves.
+//! `solid` has the geometry of rays, `body` road users as solids, `terrain` and `scenery` the
+//! rest of a scene, `path` motion, `scenes` the scenes, `fixes` the vehicle's pose messages. This
+//! file is the sensor: columns one after the other, each at its own time, while the vehicle and
+//! the scene move.
+//!
+//! What it leaves out: second returns, rays split between two surfaces, rain and spray,
+//! reflections, other sensors' light, and vehicles that lean with a slope.
+
+mod body;
+
+mod fixes;
+
+pub mod path;
 
 pub mod scenario;
 
+mod scenery;
+
+mod scenes;
+
+mod sight;
+
 mod solid;
+
+mod terrain;
 
 use crate::cloud::sensor::VLP16;
 use crate::random::Random;
 use crate::time::{Span, Time};
 use crate::wire::envelope::Postmark;
 use crate::wire::point_cloud::{CompactPointCloud, POINT_CLOUD_ID};
-use scenario::{Class, Scenario};
-use solid::Ray;
+use fixes::Receiver;
+use path::Moment;
+use scenario::{Class, PoseMessages, Scenario, Scene};
+use sight::{Carrier, Sight, Surface};
+use solid::Hit;
 
 /// When simulated sessions begin.
 const EPOCH: Time = Time::from_micros(1_700_000_000_000_000);
 /// Revolutions a second.
 const ROTATION_HZ: f64 = 10.0;
-/// Standard deviation of a range (VLP-16 user manual: accuracy of 3 cm, "typical").
-const RANGE_DEVIATION_M: f64 = 0.02;
-/// Part of the rays that come back from nothing although they hit something.
-const DROPOUTS: f64 = 0.02;
-/// Beyond this the road reflects too little to be seen at its grazing angle.
-const GROUND_RANGE_M: f64 = 50.0;
+/// Standard deviation of a range at right angles (VLP-16 user manual: accuracy of 3 cm,
+/// "typical"; a surface at rest shows 1 to 2 cm).
+const RANGE_DEVIATION_M: f64 = 0.015;
+/// Full angle of the beam (VLP-16 user manual: 3 mrad).
+const BEAM_RAD: f64 = 0.003;
+/// Share of the beam's footprint along the ray by which a range at grazing angles scatters.
+const FOOTPRINT_SHARE: f64 = 0.08;
+/// Share of rays that come back from nothing although they hit something.
+const DROPOUTS: f64 = 0.01;
+/// What comes back from a white surface at one metre is 1; at this the sensor sees half of the
+/// rays. A tenth as bright a surface is then seen to some 75 m.
+const THRESHOLD: f64 = 1.8e-5;
+/// How sharply seeing ends: the power of signal over threshold.
+const SHARPNESS: f64 = 4.0;
 /// Range of the sensor.
 const RANGE_M: std::ops::Range<f64> = 0.4..100.0;
 /// Distances are sent in centimetres.
@@ -35,8 +65,12 @@ const UNIT_M: f64 = 0.01;
 pub struct Truth {
     /// End of the sweep.
     pub time: Time,
-    /// Height of the sensor above the road.
-    pub sensor_height_m: f64,
+    /// The sensor in the local frame: east, north, up.
+    pub sensor_m: [f64; 3],
+    /// Forward, counter-clockwise from east.
+    pub sensor_yaw_rad: f64,
+    /// Along the yaw.
+    pub sensor_speed_mps: f64,
     /// All road users, seen or not.
     pub objects: Vec<TrueObject>,
 }
@@ -65,36 +99,65 @@ pub struct TrueObject {
 /// A running simulation.
 #[derive(Debug, Clone)]
 pub struct Simulation {
-    scenario: Scenario,
-    random: Random,
+    scene: Scene,
+    seed: u64,
+    receiver: Receiver,
+    /// Number of the next fix.
+    fix: u64,
     /// Number of the next column since the beginning.
     column: u64,
     distances: Vec<u8>,
+    labels: Vec<i32>,
+}
+
+/// What a ray of the last revolution ended on, as in the labels of `kreisel process`.
+pub mod label {
+    /// On nothing.
+    pub const NO_RETURN: i32 = 0;
+    /// On the ground, a kerb, or a verge.
+    pub const GROUND: i32 = 1;
+    /// On something that stands.
+    pub const SCENERY: i32 = 2;
+    /// On the road user with the number that is added to it.
+    pub const FIRST_ROAD_USER: i32 = 100;
 }
 
 impl Simulation {
-    /// A simulation of `scenario` whose noise follows from `seed`.
+    /// A simulation of `scenario` whose road users, noise and fixes follow from `seed`.
     pub fn new(scenario: Scenario, seed: u64) -> Self {
+        let scene = scenario.scene(seed);
         Self {
-            scenario,
-            random: Random::new(seed),
+            receiver: Receiver::new(scene.poses, seed),
+            scene,
+            seed,
+            fix: 0,
             column: 0,
             distances: vec![],
+            labels: vec![],
         }
     }
 
-    /// Turns the sensor once. Appends the revolution as a frame, as the OpenDLV device service
-    /// sends it, and gives the truth at its end.
+    /// What each ray of the last revolution ended on, see [`label`]; columns one after the
+    /// other.
+    pub fn labels(&self) -> &[i32] {
+        &self.labels
+    }
+
+    /// Turns the sensor once. Appends the frames of the vehicle's poses up to its end, and then
+    /// the revolution as the OpenDLV device service sends it. Gives the truth at its end.
     pub fn revolve(&mut self, out: &mut Vec<u8>) -> Truth {
         self.distances.clear();
-        let mut hits = vec![0; self.scenario.actors.len()];
+        self.labels.clear();
+        let mut hits = vec![0; self.scene.actors.len()];
         let first = self.column;
+        let parts = sight::parts(&self.scene, seconds_of(first));
         while turn_of(self.column) == turn_of(first) {
-            self.cast_column(&mut hits);
+            self.cast_column(&parts, &mut hits);
             self.column += 1;
         }
         // The first packet of the next revolution closes this one.
         let time = EPOCH + Span::from_seconds(seconds_of(self.column));
+        self.put_fixes(out);
         let cloud = CompactPointCloud {
             start_azimuth_deg: azimuth_deg(first) as f32,
             end_azimuth_deg: azimuth_deg(self.column - 1) as f32,
@@ -111,58 +174,100 @@ impl Simulation {
         self.truth(time, &hits)
     }
 
-    fn cast_column(&mut self, hits: &mut [usize]) {
-        let seconds = seconds_of(self.column);
-        let azimuth_rad = azimuth_deg(self.column).to_radians();
-        let scene = self.scenario.at(seconds, azimuth_rad);
-        for elevation_deg in VLP16.elevation_deg {
-            let ray = Ray::new(azimuth_rad, elevation_deg.to_radians());
-            let hit = scene.nearest(&ray);
-            let range_m = self.measure(hit.map(|(range_m, _)| range_m));
-            if let (Some((_, Some(actor))), 1..) = (hit, range_m) {
-                hits[actor] += 1;
+    fn put_fixes(&mut self, out: &mut Vec<u8>) {
+        if self.scene.poses == PoseMessages::None {
+            return;
+        }
+        let until_s = seconds_of(self.column);
+        loop {
+            let seconds = self.fix as f64 * fixes::PERIOD_S;
+            if seconds > until_s {
+                return;
             }
-            self.distances.extend_from_slice(&range_m.to_be_bytes());
+            let carrier = Carrier::of(&self.scene, seconds);
+            // The frame's origin is where the sensor was at the beginning.
+            let height_m = carrier.sensor_m[2] - Carrier::of(&self.scene, 0.0).sensor_m[2];
+            let time = EPOCH + Span::from_seconds(seconds);
+            self.receiver.put(out, time, &carrier.moment, height_m);
+            self.fix += 1;
         }
     }
 
-    /// Centimetres, cut off as the device service does, or 0 where nothing comes back.
-    fn measure(&mut self, range_m: Option<f64>) -> u16 {
-        // Both are drawn for every ray, so that one scene's noise does not depend on another's.
-        let (noise_m, luck) = (
-            RANGE_DEVIATION_M * self.random.normal(),
-            self.random.uniform(),
-        );
-        match range_m.map(|range_m| range_m + noise_m) {
-            Some(range_m) if RANGE_M.contains(&range_m) && luck >= DROPOUTS => {
-                (range_m / UNIT_M) as u16
-            }
-            _ => 0,
+    fn cast_column(&mut self, parts: &[Vec<solid::Solid>], hits: &mut [usize]) {
+        let azimuth_rad = azimuth_deg(self.column).to_radians();
+        let sight = Sight::new(&self.scene, parts, seconds_of(self.column), azimuth_rad);
+        for (layer, elevation_deg) in VLP16.elevation_deg.iter().enumerate() {
+            // Every ray has its own luck, so that one scene's noise does not depend on another.
+            let number = self.column * VLP16.elevation_deg.len() as u64 + layer as u64;
+            let luck = &mut Random::new(self.seed ^ number.wrapping_mul(0x2545_f491_4f6c_dd1d));
+            let ray = sight.ray(azimuth_rad, elevation_deg.to_radians());
+            let nearest = sight.nearest(&ray, luck);
+            let units = nearest.map_or(0, |(hit, _)| measured(&hit, luck));
+            let label = match nearest {
+                _ if units == 0 => label::NO_RETURN,
+                None => label::NO_RETURN,
+                Some((_, Surface::Ground)) => label::GROUND,
+                Some((_, Surface::Scenery)) => label::SCENERY,
+                Some((_, Surface::RoadUser(actor))) => {
+                    hits[actor] += 1;
+                    label::FIRST_ROAD_USER + actor as i32
+                }
+            };
+            self.labels.push(label);
+            self.distances.extend_from_slice(&units.to_be_bytes());
         }
     }
 
     fn truth(&self, time: Time, hits: &[usize]) -> Truth {
         let seconds = (time - EPOCH).seconds();
-        let objects = self.scenario.actors.iter().zip(hits).enumerate();
+        let carrier = Carrier::of(&self.scene, seconds);
+        // The frame's origin is where the sensor was at the beginning.
+        let begin_m = Carrier::of(&self.scene, 0.0).sensor_m;
+        let local_m = |at: [f64; 2]| [at[0] - begin_m[0], at[1] - begin_m[1]];
+        let [x, y, z] = [0, 1, 2].map(|axis| carrier.sensor_m[axis] - begin_m[axis]);
+        let objects = self.scene.actors.iter().zip(hits).enumerate();
         Truth {
             time,
-            sensor_height_m: self.scenario.sensor_height_m,
+            sensor_m: [x, y, z],
+            sensor_yaw_rad: carrier.moment.yaw_rad,
+            sensor_speed_mps: carrier.moment.speed_mps,
             objects: objects
                 .map(|(id, (actor, points))| {
-                    let pose = actor.path.at(seconds);
+                    let Moment {
+                        position_m,
+                        yaw_rad,
+                        speed_mps,
+                        yaw_rate_radps,
+                        ..
+                    } = actor.path.at(seconds);
                     TrueObject {
                         id: id as u32,
-                        class: actor.class,
-                        centre_m: pose.centre_m,
-                        yaw_rad: pose.yaw_rad,
-                        speed_mps: actor.path.speed_mps(),
-                        yaw_rate_radps: actor.path.yaw_rate_radps(),
-                        size_m: actor.class.size_m(),
+                        class: actor.variant.class,
+                        centre_m: local_m(position_m),
+                        yaw_rad,
+                        speed_mps,
+                        yaw_rate_radps,
+                        size_m: actor.variant.size_m,
                         points: *points,
                     }
                 })
                 .collect(),
         }
+    }
+}
+
+/// Centimetres, cut off as the device service does, or 0 where nothing comes back.
+fn measured(hit: &Hit, luck: &mut Random) -> u16 {
+    let signal = hit.reflectance * hit.incidence / (hit.range_m * hit.range_m);
+    let seen = 1.0 / (1.0 + (THRESHOLD / signal.max(1e-12)).powf(SHARPNESS));
+    // At a grazing angle the spot is long, and the range is that of some part of it.
+    let footprint_m = hit.range_m * BEAM_RAD / hit.incidence.max(0.02);
+    let deviation_m = libm::hypot(RANGE_DEVIATION_M, FOOTPRINT_SHARE * footprint_m);
+    let range_m = hit.range_m + deviation_m * luck.normal();
+    if RANGE_M.contains(&range_m) && luck.uniform() < seen * (1.0 - DROPOUTS) {
+        (range_m / UNIT_M) as u16
+    } else {
+        0
     }
 }
 
@@ -183,11 +288,10 @@ fn azimuth_deg(column: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::Envelope;
+    use crate::wire::Recording;
 
-    fn revolutions(seed: u64, count: usize) -> (Vec<u8>, Vec<Truth>) {
-        let scenario = scenario::find("roundabout").unwrap();
-        let mut simulation = Simulation::new(scenario, seed);
+    fn revolutions(name: &str, seed: u64, count: usize) -> (Vec<u8>, Vec<Truth>) {
+        let mut simulation = Simulation::new(scenario::find(name).unwrap(), seed);
         let mut out = vec![];
         let truth = (0..count).map(|_| simulation.revolve(&mut out)).collect();
         (out, truth)
@@ -195,15 +299,15 @@ mod tests {
 
     #[test]
     fn the_same_seed_gives_the_same_bytes_and_another_gives_others() {
-        assert_eq!(revolutions(3, 2), revolutions(3, 2));
-        assert_ne!(revolutions(3, 2).0, revolutions(4, 2).0);
+        assert_eq!(revolutions("hill", 3, 2), revolutions("hill", 3, 2));
+        assert_ne!(revolutions("hill", 3, 2).0, revolutions("hill", 4, 2).0);
     }
 
     #[test]
     fn a_revolution_has_the_columns_of_ten_hertz_and_ends_a_tenth_later() {
-        let (out, truth) = revolutions(1, 3);
-        let (envelope, _) = Envelope::from_datagram(&out).unwrap();
-        let cloud = CompactPointCloud::decode(envelope.payload, 0).unwrap();
+        let (out, truth) = revolutions("standing", 1, 3);
+        let entry = Recording::new(&out).next().unwrap().unwrap();
+        let cloud = CompactPointCloud::decode(entry.envelope.payload, 0).unwrap();
         assert!(
             (1808..=1809).contains(&cloud.columns()),
             "{}",
@@ -215,11 +319,30 @@ mod tests {
     }
 
     #[test]
-    fn every_road_user_is_hit() {
-        let (_, truth) = revolutions(1, 1);
-        assert_eq!(truth[0].objects.len(), 5);
-        for object in &truth[0].objects {
-            assert!(object.points >= 5, "{object:?}");
-        }
+    fn poses_come_a_hundred_times_a_second_and_before_their_revolution() {
+        let (out, _) = revolutions("roundabout", 1, 3);
+        let entries = Recording::new(&out).map(|entry| entry.unwrap().envelope);
+        let ids: Vec<i32> = entries.map(|envelope| envelope.data_type).collect();
+        let first = ids.iter().position(|id| *id == POINT_CLOUD_ID).unwrap();
+        assert!((10..=12).contains(&first), "{first}");
+        assert_eq!(ids.iter().filter(|id| **id == 533).count(), ids.len() - 3);
+        assert_eq!(ids.last(), Some(&POINT_CLOUD_ID));
+    }
+
+    #[test]
+    fn the_ground_is_where_the_sensor_is_not() {
+        let mut simulation = Simulation::new(scenario::find("occlusion").unwrap(), 1);
+        let truth = simulation.revolve(&mut vec![]);
+        let labels = simulation.labels();
+        let share = |label: i32| {
+            let count = labels.iter().filter(|found| **found == label).count();
+            count as f64 / labels.len() as f64
+        };
+        assert!((0.2..0.6).contains(&share(label::GROUND)));
+        assert!(share(label::SCENERY) > 0.02);
+        let lorry = label::FIRST_ROAD_USER;
+        let on_lorry = labels.iter().filter(|found| **found == lorry).count();
+        assert_eq!(on_lorry, truth.objects[0].points);
+        assert!(on_lorry > 500);
     }
 }

@@ -1,15 +1,18 @@
 //! Scenes: who is there, on which path, and what stands around.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
-
-use super::GROUND_RANGE_M;
-use super::solid::{Ray, Shape, Solid};
+use super::path::Path;
+use super::scenery::Scenery;
+use super::scenes;
+use super::terrain::Terrain;
+use crate::random::Random;
 
 /// What a road user is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Class {
-    /// A passenger car.
+    /// A passenger car or a van.
     Car,
+    /// A lorry or a bus.
+    Truck,
     /// A bicycle with its rider.
     Cyclist,
     /// Somebody on foot.
@@ -21,270 +24,152 @@ impl Class {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Car => "car",
+            Self::Truck => "truck",
             Self::Cyclist => "cyclist",
             Self::Pedestrian => "pedestrian",
         }
     }
+}
 
+/// A road user's looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Variant {
+    /// What it is.
+    pub class: Class,
     /// Length, width and height.
-    pub const fn size_m(self) -> [f64; 3] {
-        match self {
-            Self::Car => [4.3, 1.8, 1.45],
-            Self::Cyclist => [1.8, 0.5, 1.75],
-            Self::Pedestrian => [0.5, 0.5, 1.75],
+    pub size_m: [f64; 3],
+    /// Share of the light that its paint or coat throws back.
+    pub reflectance: f64,
+}
+
+/// Small car, two hatchbacks, two notchbacks, an SUV, a van.
+const CARS_M: [[f64; 3]; 7] = [
+    [3.6, 1.65, 1.48],
+    [4.05, 1.75, 1.45],
+    [4.3, 1.8, 1.46],
+    [4.65, 1.83, 1.44],
+    [4.85, 1.87, 1.45],
+    [4.6, 1.9, 1.68],
+    [4.9, 1.93, 1.97],
+];
+
+impl Variant {
+    /// One of the cars, with its paint.
+    pub(super) fn car(random: &mut Random) -> Self {
+        let size_m = CARS_M[random.below(CARS_M.len())];
+        Self {
+            class: Class::Car,
+            size_m: size_m.map(|metres| metres * (0.97 + 0.06 * random.uniform())),
+            reflectance: 0.1 + 0.6 * random.uniform(),
+        }
+    }
+
+    pub(super) fn bus() -> Self {
+        Self {
+            class: Class::Truck,
+            size_m: [12.0, 2.55, 3.1],
+            reflectance: 0.5,
+        }
+    }
+
+    pub(super) fn lorry() -> Self {
+        Self {
+            class: Class::Truck,
+            size_m: [7.5, 2.45, 3.3],
+            reflectance: 0.5,
+        }
+    }
+
+    pub(super) fn cyclist(random: &mut Random) -> Self {
+        Self {
+            class: Class::Cyclist,
+            size_m: [
+                1.68 + 0.14 * random.uniform(),
+                0.56 + 0.1 * random.uniform(),
+                1.62 + 0.24 * random.uniform(),
+            ],
+            reflectance: 0.2 + 0.5 * random.uniform(),
+        }
+    }
+
+    pub(super) fn pedestrian(random: &mut Random) -> Self {
+        Self {
+            class: Class::Pedestrian,
+            size_m: [
+                0.45,
+                0.48 + 0.12 * random.uniform(),
+                1.58 + 0.3 * random.uniform(),
+            ],
+            reflectance: 0.15 + 0.5 * random.uniform(),
         }
     }
 }
 
-/// A scene with a standing sensor.
+/// A road user on its path.
 #[derive(Debug, Clone)]
+pub struct Actor {
+    /// What it looks like.
+    pub variant: Variant,
+    /// Where it goes.
+    pub path: Path,
+}
+
+/// In which messages the vehicle says where it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PoseMessages {
+    /// It does not.
+    None,
+    /// Applanix position group 1.
+    Applanix,
+    /// OpenDLV's position and heading.
+    OpenDlv,
+}
+
+/// A scene at its beginning.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// Height of the sensor above the road.
+    pub sensor_height_m: f64,
+    /// How the sensor's vehicle goes.
+    pub ego: Path,
+    /// How it says so.
+    pub poses: PoseMessages,
+    /// Who is there.
+    pub actors: Vec<Actor>,
+    pub(super) scenery: Scenery,
+    pub(super) terrain: Terrain,
+}
+
+/// A scene that can be made.
+#[derive(Debug, Clone, Copy)]
 pub struct Scenario {
     /// The name on the command line.
     pub name: &'static str,
     /// What happens, in a line.
     pub summary: &'static str,
-    /// Height of the sensor above the road.
-    pub sensor_height_m: f64,
-    /// Who is there.
-    pub actors: Vec<Actor>,
-    /// What stands around, heights above the road.
-    statics: Vec<Solid>,
+    pub(super) build: fn(&mut Random) -> Scene,
 }
 
-/// A road user on its path.
-#[derive(Debug, Clone, Copy)]
-pub struct Actor {
-    /// What it is.
-    pub class: Class,
-    /// Where it goes.
-    pub path: Circle,
-}
-
-/// A circle that is driven round and round.
-#[derive(Debug, Clone, Copy)]
-pub struct Circle {
-    centre_m: [f64; 2],
-    radius_m: f64,
-    /// Where on the circle it is at the beginning, counter-clockwise from x.
-    start_rad: f64,
-    /// Counter-clockwise; negative the other way round.
-    rate_radps: f64,
-}
-
-/// Where an actor is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ActorPose {
-    /// Middle of its box.
-    pub centre_m: [f64; 2],
-    /// Direction of motion in (-pi, pi].
-    pub yaw_rad: f64,
-}
-
-impl Circle {
-    fn new(radius_m: f64, start_deg: f64, speed_mps: f64) -> Self {
-        Self {
-            centre_m: ROUNDABOUT_M,
-            radius_m,
-            start_rad: start_deg.to_radians(),
-            rate_radps: speed_mps / radius_m,
-        }
-    }
-
-    /// Where it is after some time.
-    pub fn at(&self, seconds: f64) -> ActorPose {
-        let angle_rad = self.start_rad + self.rate_radps * seconds;
-        let (sine, cosine) = libm::sincos(angle_rad);
-        let ahead_rad = angle_rad + FRAC_PI_2.copysign(self.rate_radps);
-        ActorPose {
-            centre_m: [
-                self.centre_m[0] + self.radius_m * cosine,
-                self.centre_m[1] + self.radius_m * sine,
-            ],
-            yaw_rad: ahead_rad - TAU * libm::ceil((ahead_rad - PI) / TAU),
-        }
-    }
-
-    /// Speed along the path.
-    pub fn speed_mps(&self) -> f64 {
-        libm::fabs(self.rate_radps) * self.radius_m
-    }
-
-    /// Rate of turn, counter-clockwise.
-    pub fn yaw_rate_radps(&self) -> f64 {
-        self.rate_radps
+impl Scenario {
+    /// The scene of a seed: vehicles, sizes and speeds differ from seed to seed.
+    pub fn scene(&self, seed: u64) -> Scene {
+        (self.build)(&mut Random::new(seed))
     }
 }
 
 /// All scenarios.
-pub fn all() -> Vec<Scenario> {
-    vec![roundabout()]
+pub fn all() -> &'static [Scenario] {
+    scenes::ALL
 }
 
 /// A scenario by its name.
 pub fn find(name: &str) -> Option<Scenario> {
-    all().into_iter().find(|scenario| scenario.name == name)
-}
-
-/// Middle of the roundabout as seen from the sensor, which waits at an entry.
-const ROUNDABOUT_M: [f64; 2] = [0.0, 24.0];
-
-/// A small roundabout of 30 m outer diameter (thesis section 2.2.2). The circular path is
-/// shared by three cars at 29 km/h; a cyclist at 15 km/h and a pedestrian at 5 km/h go round
-/// on their own paths outside it.
-fn roundabout() -> Scenario {
-    let actor = |class, radius_m, start_deg, speed_mps| Actor {
-        class,
-        path: Circle::new(radius_m, start_deg, speed_mps),
-    };
-    let upright = |x: f64, y: f64, radius_m: f64, high_m: f64| Solid {
-        shape: Shape::Cylinder {
-            centre_m: [x, y],
-            radius_m,
-        },
-        low_m: 0.0,
-        high_m,
-    };
-    let wall = |x: f64, y: f64, length_m: f64, yaw_rad: f64, high_m: f64| Solid {
-        shape: Shape::Box {
-            centre_m: [x, y],
-            yaw_rad,
-            length_m,
-            width_m: 0.4,
-        },
-        low_m: 0.0,
-        high_m,
-    };
-    let [x, y] = ROUNDABOUT_M;
-    Scenario {
-        name: "roundabout",
-        summary: "a small roundabout of 30 m: three cars, a cyclist, a pedestrian; the sensor stands at an entry",
-        sensor_height_m: 2.0,
-        actors: vec![
-            actor(Class::Car, 12.0, 200.0, 8.0),
-            actor(Class::Car, 12.0, 320.0, 8.0),
-            actor(Class::Car, 12.0, 80.0, 8.0),
-            actor(Class::Cyclist, 16.0, 10.0, 4.17),
-            actor(Class::Pedestrian, 20.5, 305.0, -1.39),
-        ],
-        statics: vec![
-            // Planting on the island, lamp posts around it, walls and a house farther off.
-            upright(x, y, 3.0, 0.7),
-            upright(x - 19.0, y - 19.0, 0.1, 6.0),
-            upright(x + 19.0, y - 19.0, 0.1, 6.0),
-            upright(x + 19.0, y + 19.0, 0.1, 6.0),
-            upright(x - 19.0, y + 19.0, 0.1, 6.0),
-            wall(-32.0, y, 30.0, FRAC_PI_2, 1.2),
-            wall(30.0, y + 10.0, 12.0, FRAC_PI_2, 6.0),
-            wall(5.0, -22.0, 40.0, 0.1, 2.0),
-        ],
-    }
-}
-
-/// Everything that a column of rays can hit at one moment.
-pub(super) struct Scene {
-    road_m: f64,
-    solids: Vec<(Solid, Option<usize>)>,
-}
-
-impl Scenario {
-    /// The part of the scene that lies in a direction at a moment, in the sensor frame.
-    pub(super) fn at(&self, seconds: f64, azimuth_rad: f64) -> Scene {
-        let road_m = -self.sensor_height_m;
-        let (sine, cosine) = libm::sincos(azimuth_rad);
-        let in_sight = |solid: &Solid| {
-            let ([x, y], radius_m) = solid.bounds();
-            let (ahead_m, aside_m) = (x * sine + y * cosine, x * cosine - y * sine);
-            libm::fabs(aside_m) <= radius_m && ahead_m >= -radius_m
-        };
-        let lowered = |solid: Solid| Solid {
-            low_m: solid.low_m + road_m,
-            high_m: solid.high_m + road_m,
-            ..solid
-        };
-        let statics = self.statics.iter().map(|solid| (*solid, None));
-        let moving = self.actors.iter().enumerate().flat_map(|(actor, who)| {
-            let parts = parts(who.class, who.path.at(seconds));
-            parts.into_iter().map(move |solid| (solid, Some(actor)))
-        });
-        let solids = statics
-            .chain(moving)
-            .filter(|(solid, _)| in_sight(solid))
-            .map(|(solid, actor)| (lowered(solid), actor))
-            .collect();
-        Scene { road_m, solids }
-    }
-}
-
-impl Scene {
-    /// The nearest thing on a ray: its distance, and the actor that it belongs to.
-    pub(super) fn nearest(&self, ray: &Ray) -> Option<(f64, Option<usize>)> {
-        let road = Some(self.road_m / ray.direction[2])
-            .filter(|range_m| (0.0..GROUND_RANGE_M).contains(range_m))
-            .map(|range_m| (range_m, None));
-        let solids = self.solids.iter();
-        let hits = solids.filter_map(|(solid, actor)| solid.hit(ray).map(|range| (range, *actor)));
-        hits.chain(road).min_by(|a, b| a.0.total_cmp(&b.0))
-    }
-}
-
-/// The solids that make up a road user.
-fn parts(class: Class, pose: ActorPose) -> Vec<Solid> {
-    let ActorPose { centre_m, yaw_rad } = pose;
-    let block = |ahead_m: f64, length_m: f64, width_m: f64, low_m: f64, high_m: f64| Solid {
-        shape: Shape::Box {
-            centre_m: [
-                centre_m[0] + ahead_m * libm::cos(yaw_rad),
-                centre_m[1] + ahead_m * libm::sin(yaw_rad),
-            ],
-            yaw_rad,
-            length_m,
-            width_m,
-        },
-        low_m,
-        high_m,
-    };
-    let body = |radius_m: f64, low_m: f64, high_m: f64| Solid {
-        shape: Shape::Cylinder { centre_m, radius_m },
-        low_m,
-        high_m,
-    };
-    match class {
-        // Body, and a cabin that begins behind the bonnet.
-        Class::Car => vec![
-            block(0.0, 4.3, 1.8, 0.2, 0.9),
-            block(-0.4, 2.4, 1.6, 0.9, 1.45),
-        ],
-        // Wheels and frame as one thin plate, the rider above it.
-        Class::Cyclist => vec![block(0.0, 1.8, 0.1, 0.05, 0.9), body(0.25, 0.7, 1.75)],
-        Class::Pedestrian => vec![body(0.25, 0.0, 1.75)],
-    }
+    all().iter().find(|scenario| scenario.name == name).copied()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_path_moves_along_its_yaw() {
-        for actor in roundabout().actors {
-            let (now, next) = (actor.path.at(1.0), actor.path.at(1.001));
-            let moved = [0, 1].map(|axis| (next.centre_m[axis] - now.centre_m[axis]) / 0.001);
-            let [vx, vy] = moved;
-            assert!((vx.hypot(vy) - actor.path.speed_mps()).abs() < 1e-3);
-            let difference = (vy.atan2(vx) - now.yaw_rad).sin();
-            assert!(difference.abs() < 1e-2, "{difference}");
-            assert!(now.yaw_rad > -PI && now.yaw_rad <= PI);
-        }
-    }
-
-    #[test]
-    fn the_road_lies_below_the_sensor() {
-        let scene = roundabout().at(0.0, 3.0);
-        let down = Ray::new(3.0, -0.2);
-        let (range_m, actor) = scene.nearest(&down).unwrap();
-        assert!((range_m * down.direction[2] + 2.0).abs() < 1e-9);
-        assert_eq!(actor, None);
-    }
 
     #[test]
     fn names_find_their_scenarios() {
@@ -295,5 +180,60 @@ mod tests {
             );
         }
         assert!(find("nowhere").is_none());
+    }
+
+    /// Circles along a road user's length that it fills.
+    fn discs(actor: &Actor, seconds: f64) -> (Vec<[f64; 2]>, f64) {
+        let ([length_m, width_m, _], moment) = (actor.variant.size_m, actor.path.at(seconds));
+        let radius_m = 0.45 * width_m;
+        let reach_m = (0.5 * length_m - radius_m).max(0.0);
+        let (sine, cosine) = moment.yaw_rad.sin_cos();
+        let [x, y] = moment.position_m;
+        let steps = (-3..=3).map(|step| reach_m * f64::from(step) / 3.0);
+        let discs = steps.map(|along_m| [x + along_m * cosine, y + along_m * sine]);
+        (discs.collect(), radius_m)
+    }
+
+    #[test]
+    fn nobody_runs_into_anybody() {
+        let mut crashes = std::collections::BTreeMap::new();
+        for scenario in all() {
+            for seed in 1..=20 {
+                let scene = scenario.scene(seed);
+                let ego = Actor {
+                    variant: Variant {
+                        class: Class::Car,
+                        size_m: [4.5, 1.9, 1.5],
+                        reflectance: 0.5,
+                    },
+                    path: scene.ego.clone(),
+                };
+                let all: Vec<&Actor> = scene.actors.iter().chain([&ego]).collect();
+                for tenth in 0..300 {
+                    let seconds = f64::from(tenth) * 0.1;
+                    for (a, first) in all.iter().enumerate() {
+                        let (discs_a, radius_a_m) = discs(first, seconds);
+                        for (b, second) in all.iter().enumerate().skip(a + 1) {
+                            let (discs_b, radius_b_m) = discs(second, seconds);
+                            let apart_m = discs_a
+                                .iter()
+                                .flat_map(|[x, y]| {
+                                    discs_b.iter().map(move |[u, v]| (u - x).hypot(v - y))
+                                })
+                                .fold(f64::MAX, f64::min);
+                            if apart_m <= radius_a_m + radius_b_m {
+                                let times = crashes.entry((scenario.name, a, b));
+                                times.or_insert_with(Vec::new).push((seed, seconds));
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        let found: Vec<_> = crashes
+            .iter()
+            .map(|(who, when)| (who, when.first(), when.last(), when.len()))
+            .collect();
+        assert!(found.is_empty(), "{found:#?}");
     }
 }

@@ -1,88 +1,182 @@
-//! Solids that stand on the road, and rays that hit them.
+//! Solids, and rays that hit them.
 
-/// A ray from the sensor, which is the origin.
+use crate::random::Random;
+
+/// A vector in metres, or a direction.
+pub(super) type Vector = [f64; 3];
+
+pub(super) fn dot(a: &Vector, b: &Vector) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// A ray of the sensor.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ray {
+    pub(super) origin: Vector,
     /// Unit vector.
-    pub(super) direction: [f64; 3],
+    pub(super) direction: Vector,
 }
 
 impl Ray {
-    /// In the sensor's convention: azimuth clockwise from y.
-    pub(super) fn new(azimuth_rad: f64, elevation_rad: f64) -> Self {
-        let (sine_a, cosine_a) = libm::sincos(azimuth_rad);
-        let (sine_e, cosine_e) = libm::sincos(elevation_rad);
+    pub(super) fn at(&self, range_m: f64) -> Vector {
+        [0, 1, 2].map(|axis| self.origin[axis] + range_m * self.direction[axis])
+    }
+
+    /// The same ray as seen from a frame at `place`, turned by `yaw_rad`.
+    pub(super) fn seen_from(&self, place: &Vector, sine: f64, cosine: f64) -> Self {
+        let turned = |[x, y, z]: Vector| [x * cosine + y * sine, y * cosine - x * sine, z];
+        let offset = [0, 1, 2].map(|axis| self.origin[axis] - place[axis]);
         Self {
-            direction: [cosine_e * sine_a, cosine_e * cosine_a, sine_e],
+            origin: turned(offset),
+            direction: turned(self.direction),
         }
     }
-
-    /// Where the ray passes between two heights, as distances along it.
-    fn between(&self, low_m: f64, high_m: f64) -> (f64, f64) {
-        slab(0.0, self.direction[2], low_m, high_m)
-    }
 }
 
-/// A solid with upright sides between two heights.
-#[derive(Debug, Clone, Copy)]
+/// What a solid is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Fabric {
+    /// Every ray ends on its surface.
+    Dense,
+    /// Rays end somewhere within: leaves, grass. Mean way of a ray through it in metres.
+    Leaves(f64),
+    /// Some rays pass: glass, spokes, the gaps of a frame. Share of those that do.
+    Open(f64),
+}
+
+/// A convex solid.
+#[derive(Debug, Clone)]
 pub(super) struct Solid {
     pub(super) shape: Shape,
-    pub(super) low_m: f64,
-    pub(super) high_m: f64,
+    pub(super) fabric: Fabric,
+    /// Share of the light that a surface throws back at right angles.
+    pub(super) reflectance: f64,
 }
 
-/// The outline of a solid from above.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) enum Shape {
-    /// A rectangle around a middle.
-    Box {
+    /// Where all half-spaces overlap: outward unit normal, and distance from the origin.
+    Convex(Vec<(Vector, f64)>),
+    /// Upright, on a circle.
+    Cylinder {
         centre_m: [f64; 2],
-        yaw_rad: f64,
-        length_m: f64,
-        width_m: f64,
+        radius_m: f64,
+        low_m: f64,
+        high_m: f64,
     },
-    /// A circle.
-    Cylinder { centre_m: [f64; 2], radius_m: f64 },
+}
+
+/// Where a ray ends.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hit {
+    pub(super) range_m: f64,
+    /// Cosine of the angle between the ray and the surface's normal.
+    pub(super) incidence: f64,
+    pub(super) reflectance: f64,
 }
 
 impl Solid {
-    /// Distance to where a ray enters the solid.
-    pub(super) fn hit(&self, ray: &Ray) -> Option<f64> {
-        let [dx, dy, _] = ray.direction;
-        let outline = match self.shape {
-            Shape::Box {
-                centre_m: [x, y],
-                yaw_rad,
-                length_m,
-                width_m,
-            } => {
-                let (sine, cosine) = libm::sincos(yaw_rad);
-                let along = |x: f64, y: f64| x * cosine + y * sine;
-                let across = |x: f64, y: f64| y * cosine - x * sine;
-                overlap(
-                    slab(-along(x, y), along(dx, dy), -0.5 * length_m, 0.5 * length_m),
-                    slab(-across(x, y), across(dx, dy), -0.5 * width_m, 0.5 * width_m),
-                )
-            }
-            Shape::Cylinder {
-                centre_m: [x, y],
-                radius_m,
-            } => circle(x, y, dx, dy, radius_m),
+    /// Where a ray ends on or in the solid. `luck` decides what chance must decide.
+    pub(super) fn hit(&self, ray: &Ray, luck: &mut Random) -> Option<Hit> {
+        let (enter, leave, incidence) = self.shape.crossing(ray)?;
+        let hit = |range_m, incidence| {
+            Some(Hit {
+                range_m,
+                incidence,
+                reflectance: self.reflectance,
+            })
         };
-        let (enter, leave) = overlap(outline, ray.between(self.low_m, self.high_m));
-        (enter < leave && enter > 0.0).then_some(enter)
+        match self.fabric {
+            Fabric::Dense if enter > 0.0 => hit(enter, incidence),
+            Fabric::Dense => None,
+            Fabric::Open(passes) if enter > 0.0 && luck.uniform() >= passes => {
+                hit(enter, incidence)
+            }
+            Fabric::Open(_) => None,
+            Fabric::Leaves(mean_m) => {
+                // A leaf turns its face anywhere.
+                let depth_m = -mean_m * libm::log(1.0 - luck.uniform());
+                let (range_m, incidence) = (enter.max(0.0) + depth_m, 0.3 + 0.7 * luck.uniform());
+                if range_m < leave {
+                    hit(range_m, incidence)
+                } else {
+                    None
+                }
+            }
+        }
     }
 
-    /// The middle and the radius of a circle around the outline.
+    /// Radius around the origin of the frame that holds the outline of a convex solid, and the
+    /// middle and radius of a cylinder.
     pub(super) fn bounds(&self) -> ([f64; 2], f64) {
-        match self.shape {
-            Shape::Box {
-                centre_m,
-                length_m,
-                width_m,
-                ..
-            } => (centre_m, 0.5 * libm::hypot(length_m, width_m)),
-            Shape::Cylinder { centre_m, radius_m } => (centre_m, radius_m),
+        match &self.shape {
+            Shape::Convex(planes) => {
+                // The extent along each axis direction, from the planes that face it.
+                let along = |axis: usize, sign: f64| {
+                    let facing = planes
+                        .iter()
+                        .filter(|(normal, _)| normal[axis] * sign > 0.5);
+                    facing
+                        .map(|(normal, offset)| offset / normal[axis].abs())
+                        .fold(0.0, f64::max)
+                };
+                let far = |axis| along(axis, 1.0).max(along(axis, -1.0));
+                ([0.0; 2], libm::hypot(far(0), far(1)))
+            }
+            Shape::Cylinder {
+                centre_m, radius_m, ..
+            } => (*centre_m, *radius_m),
+        }
+    }
+}
+
+impl Shape {
+    /// Ranges at which a ray enters and leaves, and the cosine of its incidence.
+    fn crossing(&self, ray: &Ray) -> Option<(f64, f64, f64)> {
+        match self {
+            Self::Convex(planes) => {
+                let (mut enter, mut leave, mut incidence) = (f64::MIN, f64::MAX, 1.0);
+                for (normal, offset) in planes {
+                    let (rate, gap) = (
+                        dot(normal, &ray.direction),
+                        offset - dot(normal, &ray.origin),
+                    );
+                    if rate.abs() < 1e-12 {
+                        if gap < 0.0 {
+                            return None;
+                        }
+                    } else if rate < 0.0 && gap / rate > enter {
+                        (enter, incidence) = (gap / rate, -rate);
+                    } else if rate > 0.0 {
+                        leave = leave.min(gap / rate);
+                    }
+                }
+                (enter < leave && leave > 0.0).then_some((enter, leave, incidence))
+            }
+            Self::Cylinder {
+                centre_m: [x, y],
+                radius_m,
+                low_m,
+                high_m,
+            } => {
+                let [dx, dy, dz] = ray.direction;
+                let (ox, oy) = (x - ray.origin[0], y - ray.origin[1]);
+                let (a, b) = (dx * dx + dy * dy, dx * ox + dy * oy);
+                let discriminant = b * b - a * (ox * ox + oy * oy - radius_m * radius_m);
+                if discriminant < 0.0 || a < 1e-12 {
+                    return None;
+                }
+                let root = libm::sqrt(discriminant);
+                let around = ((b - root) / a, (b + root) / a);
+                let heights = slab(ray.origin[2], dz, *low_m, *high_m);
+                let (enter, leave) = (around.0.max(heights.0), around.1.min(heights.1));
+                let incidence = if heights.0 > around.0 {
+                    dz.abs()
+                } else {
+                    root / radius_m
+                };
+                (enter < leave && leave > 0.0).then_some((enter, leave, incidence.min(1.0)))
+            }
         }
     }
 }
@@ -90,83 +184,129 @@ impl Solid {
 /// Where `start + t * rate` lies between `low` and `high`, as an interval of t.
 fn slab(start: f64, rate: f64, low: f64, high: f64) -> (f64, f64) {
     if rate.abs() < 1e-12 {
-        let inside = (low..=high).contains(&start);
-        return if inside {
+        return if (low..=high).contains(&start) {
             (f64::MIN, f64::MAX)
         } else {
-            NOWHERE
+            (f64::MAX, f64::MIN)
         };
     }
     let (a, b) = ((low - start) / rate, (high - start) / rate);
     (a.min(b), a.max(b))
 }
 
-fn circle(x: f64, y: f64, dx: f64, dy: f64, radius_m: f64) -> (f64, f64) {
-    let (a, b) = (dx * dx + dy * dy, dx * x + dy * y);
-    let discriminant = b * b - a * (x * x + y * y - radius_m * radius_m);
-    if discriminant < 0.0 || a < 1e-12 {
-        return NOWHERE;
-    }
-    let root = libm::sqrt(discriminant);
-    ((b - root) / a, (b + root) / a)
+/// A box: `middle_m` and half its sizes, along the axes of its frame.
+pub(super) fn block(low_m: Vector, high_m: Vector) -> Shape {
+    let faces = (0..3).flat_map(|axis| {
+        [(1.0, high_m[axis]), (-1.0, -low_m[axis])].map(|(sign, offset)| {
+            let mut normal = [0.0; 3];
+            normal[axis] = sign;
+            (normal, offset)
+        })
+    });
+    Shape::Convex(faces.collect())
 }
 
-const NOWHERE: (f64, f64) = (f64::MAX, f64::MIN);
-
-fn overlap(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
-    (a.0.max(b.0), a.1.min(b.1))
+/// A convex outline in (along, up), counter-clockwise, drawn out to `half_width_m` on either
+/// side.
+pub(super) fn extruded(outline_m: &[[f64; 2]], half_width_m: f64) -> Vec<(Vector, f64)> {
+    let next = outline_m.iter().cycle().skip(1);
+    let edges = outline_m.iter().zip(next).map(|([u, z], [u2, z2])| {
+        let length = libm::hypot(u2 - u, z2 - z);
+        let (normal_u, normal_z) = ((z2 - z) / length, (u - u2) / length);
+        ([normal_u, 0.0, normal_z], normal_u * u + normal_z * z)
+    });
+    edges
+        .chain([
+            ([0.0, 1.0, 0.0], half_width_m),
+            ([0.0, -1.0, 0.0], half_width_m),
+        ])
+        .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const AHEAD: Ray = Ray {
-        direction: [0.0, 1.0, 0.0],
-    };
+    fn ray(origin: Vector, direction: Vector) -> Ray {
+        let length = dot(&direction, &direction).sqrt();
+        Ray {
+            origin,
+            direction: direction.map(|part| part / length),
+        }
+    }
+
+    fn dense(shape: Shape) -> Solid {
+        Solid {
+            shape,
+            fabric: Fabric::Dense,
+            reflectance: 0.5,
+        }
+    }
 
     #[test]
     fn a_box_is_hit_on_its_near_side() {
-        let mut solid = Solid {
-            shape: Shape::Box {
-                centre_m: [0.5, 10.0],
-                yaw_rad: std::f64::consts::FRAC_PI_2,
-                length_m: 4.0,
-                width_m: 2.0,
-            },
-            low_m: -1.0,
-            high_m: 0.5,
-        };
-        assert!((solid.hit(&AHEAD).unwrap() - 8.0).abs() < 1e-9);
-        solid.high_m = -0.5;
-        assert_eq!(solid.hit(&AHEAD), None);
+        let solid = dense(block([-2.0, -1.0, 0.0], [2.0, 1.0, 1.5]));
+        let luck = &mut Random::new(1);
+        let hit = solid
+            .hit(&ray([-10.0, 0.0, 1.0], [1.0, 0.0, 0.0]), luck)
+            .unwrap();
+        assert!((hit.range_m - 8.0).abs() < 1e-9 && (hit.incidence - 1.0).abs() < 1e-9);
+        let over = ray([-10.0, 0.0, 1.6], [1.0, 0.0, 0.0]);
+        assert!(solid.hit(&over, luck).is_none());
+        let away = ray([-10.0, 0.0, 1.0], [-1.0, 0.0, 0.0]);
+        assert!(solid.hit(&away, luck).is_none());
     }
 
     #[test]
-    fn a_ray_that_falls_hits_the_top() {
-        let solid = Solid {
-            shape: Shape::Cylinder {
-                centre_m: [0.0, 10.0],
-                radius_m: 3.0,
-            },
-            low_m: -2.0,
-            high_m: -1.0,
-        };
-        let down = Ray::new(0.0, -(0.125f64).atan());
-        assert!((down.direction[2] * solid.hit(&down).unwrap() + 1.0).abs() < 1e-9);
-        assert_eq!(solid.hit(&Ray::new(0.5, 0.0)), None);
+    fn a_sloped_screen_is_hit_where_it_slopes() {
+        // A wedge that rises from 0 to 1 over a metre.
+        let wedge = dense(Shape::Convex(extruded(
+            &[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]],
+            1.0,
+        )));
+        let luck = &mut Random::new(1);
+        let hit = wedge
+            .hit(&ray([-5.0, 0.0, 0.5], [1.0, 0.0, 0.0]), luck)
+            .unwrap();
+        assert!((hit.range_m - 5.5).abs() < 1e-9);
+        assert!((hit.incidence - 0.5f64.sqrt()).abs() < 1e-9);
     }
 
     #[test]
-    fn what_lies_behind_is_not_hit() {
-        let solid = Solid {
-            shape: Shape::Cylinder {
-                centre_m: [0.0, -10.0],
-                radius_m: 1.0,
-            },
-            low_m: -2.0,
+    fn a_cylinder_is_hit_around_and_on_top() {
+        let drum = dense(Shape::Cylinder {
+            centre_m: [0.0, 10.0],
+            radius_m: 3.0,
+            low_m: 0.0,
             high_m: 1.0,
+        });
+        let luck = &mut Random::new(1);
+        let level = ray([0.0, 0.0, 0.5], [0.0, 1.0, 0.0]);
+        assert!((drum.hit(&level, luck).unwrap().range_m - 7.0).abs() < 1e-9);
+        let down = ray([0.0, 10.0, 5.0], [0.0, 0.0, -1.0]);
+        assert!(drum.hit(&down, luck).is_none_or(|hit| hit.range_m > 3.9));
+        let falling = ray([0.0, 0.0, 2.0], [0.0, 8.0, -1.0]);
+        let top = falling.at(drum.hit(&falling, luck).unwrap().range_m);
+        assert!((top[2] - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn half_of_the_rays_pass_a_half_open_solid_and_leaves_stop_them_within() {
+        let shape = block([-1.0, -1.0, 0.0], [1.0, 1.0, 2.0]);
+        let along = ray([-5.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
+        let mut luck = Random::new(5);
+        let mut ranges = |fabric| {
+            let solid = Solid {
+                shape: shape.clone(),
+                fabric,
+                reflectance: 0.5,
+            };
+            let hits = (0..1000).filter_map(|_| solid.hit(&along, &mut luck));
+            hits.map(|hit| hit.range_m).collect::<Vec<_>>()
         };
-        assert_eq!(solid.hit(&AHEAD), None);
+        let open = ranges(Fabric::Open(0.5)).len();
+        assert!((400..600).contains(&open), "{open}");
+        let leaves = ranges(Fabric::Leaves(0.5));
+        assert!(leaves.len() > 950 && leaves.iter().all(|range| (4.0..6.0).contains(range)));
     }
 }

@@ -1,144 +1,436 @@
-//! Velocity by difference of positions.
+//! How road users move: three hypotheses side by side (interacting multiple model; Blom,
+//! Bar-Shalom 1988), each a Kalman filter on the same state.
+//!
+//! The state is Cartesian, so that a first sighting, whose heading nobody knows, is a velocity
+//! of 0 with an honest variance rather than a heading that must be made up.
 
-use super::{CENTRE_DEVIATION_M, UNKNOWN_SPEED_DEVIATION_MPS};
-use crate::time::Time;
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
-/// Above this speed an object moves along its length.
-const MOVING_MPS: f64 = 0.8;
-/// Travel that shows a direction: noise of 0.1 m turns it by 5 degrees.
-const TRAVEL_M: f64 = 1.5;
+/// x, y, their velocities, and the rate of turn.
+type State = SVector<f64, 5>;
+type Covariance = SMatrix<f64, 5, 5>;
 
-/// Over a shorter time a difference of positions is noise, whatever the time stamps say.
-const LEAST_PASSED_S: f64 = 0.02;
-
-/// Where an object was seen lately.
-#[derive(Debug, Clone)]
-pub(super) struct Motion {
-    id: u32,
-    first_seen: Time,
-    observations: u32,
-    /// Oldest first.
-    positions: Vec<(Time, [f64; 2])>,
-    velocity: Velocity,
+/// A hypothesis of motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Model {
+    /// It stands.
+    Standing,
+    /// It goes straight on.
+    Straight,
+    /// It turns at a rate of its own.
+    Turning,
 }
 
-/// A velocity in the local frame.
+const MODELS: [Model; 3] = [Model::Standing, Model::Straight, Model::Turning];
+
+/// Probability of each hypothesis after a tenth of a second, given the one before.
+const TRANSITION: [[f64; 3]; 3] = [
+    [0.975, 0.015, 0.010],
+    [0.010, 0.940, 0.050],
+    [0.010, 0.050, 0.940],
+];
+/// What a new object does.
+const AT_BIRTH: [f64; 3] = [0.5, 0.25, 0.25];
+
+/// How lively each hypothesis is: drift of the place, m/√s; acceleration along either axis,
+/// m/s²; change of the rate of turn, rad/s².
+const DRIFT: f64 = 0.03;
+const STRAIGHT_MPS2: f64 = 1.0;
+const TURNING_MPS2: f64 = 2.0;
+const TURNING_RADPS2: f64 = 0.7;
+/// Velocity that a standing object has at most, m/s, and rate of turn of a straight one, rad/s.
+const STILL_MPS: f64 = 0.02;
+const STRAIGHT_RADPS: f64 = 0.01;
+/// Of a rate of turn that was not measured yet: a car in a small roundabout has 0.7.
+const UNKNOWN_RADPS: f64 = 0.4;
+/// Tighter turns are noise.
+const TIGHTEST_RADPS: f64 = 1.5;
+
+/// What is slower than this may stand a tenth of a second later.
+const STOPPING_MPS: f64 = 0.8;
+
+#[derive(Debug, Clone)]
+struct Hypothesis {
+    state: State,
+    covariance: Covariance,
+    probability: f64,
+}
+
+/// Where an object is and how it moves.
+#[derive(Debug, Clone)]
+pub(super) struct Motion {
+    hypotheses: [Hypothesis; 3],
+}
+
+/// What all hypotheses say together.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Velocity {
-    /// East and north.
-    pub(super) mps: [f64; 2],
-    /// Standard deviation of either.
-    pub(super) deviation_mps: f64,
-    /// Whether it was measured at all.
-    pub(super) known: bool,
+pub(super) struct Estimate {
+    pub(super) position_m: Vector2<f64>,
+    pub(super) velocity_mps: Vector2<f64>,
+    pub(super) yaw_rate_radps: f64,
+    pub(super) position_covariance: Matrix2<f64>,
+    pub(super) velocity_covariance: Matrix2<f64>,
+    /// Probability that it stands.
+    pub(super) standing: f64,
 }
 
 impl Motion {
-    pub(super) fn new(id: u32) -> Self {
+    /// Something seen for the first time, which may move at any speed of `speed_deviation_mps`.
+    pub(super) fn new(
+        position_m: Vector2<f64>,
+        noise: Matrix2<f64>,
+        speed_deviation_mps: f64,
+    ) -> Self {
+        let hypothesis = |model: Model, probability| {
+            let mut state = State::zeros();
+            state.fixed_rows_mut::<2>(0).copy_from(&position_m);
+            let mut covariance = Covariance::zeros();
+            covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&noise);
+            let (speed, turn) = match model {
+                Model::Standing => (STILL_MPS, STRAIGHT_RADPS),
+                Model::Straight => (speed_deviation_mps, STRAIGHT_RADPS),
+                Model::Turning => (speed_deviation_mps, UNKNOWN_RADPS),
+            };
+            covariance[(2, 2)] = speed * speed;
+            covariance[(3, 3)] = speed * speed;
+            covariance[(4, 4)] = turn * turn;
+            Hypothesis {
+                state,
+                covariance,
+                probability,
+            }
+        };
         Self {
-            id,
-            first_seen: Time::ZERO,
-            observations: 0,
-            positions: vec![],
-            velocity: Velocity {
-                mps: [0.0; 2],
-                deviation_mps: UNKNOWN_SPEED_DEVIATION_MPS,
-                known: false,
-            },
+            hypotheses: std::array::from_fn(|number| hypothesis(MODELS[number], AT_BIRTH[number])),
         }
     }
 
-    pub(super) fn id(&self) -> u32 {
-        self.id
-    }
-
-    pub(super) fn first_seen(&self) -> Time {
-        self.first_seen
-    }
-
-    pub(super) fn velocity(&self) -> Velocity {
-        self.velocity
-    }
-
-    /// Direction of motion, if it moves: that of the latest travel long enough to show one. A
-    /// longer travel would lag behind in a bend.
-    pub(super) fn heading_rad(&self) -> Option<f64> {
-        let (_, [x, y]) = self.positions.last()?;
-        let [vx, vy] = self.velocity.mps;
-        if !self.velocity.known || libm::hypot(vx, vy) <= MOVING_MPS {
-            return None;
+    /// Carries everything on by some seconds, 0 or more.
+    pub(super) fn predict(&mut self, seconds: f64) {
+        if seconds <= 0.0 {
+            return;
         }
-        let travels = self
-            .positions
-            .iter()
-            .rev()
-            .map(|(_, then)| [x - then[0], y - then[1]]);
-        let long = travels
-            .into_iter()
-            .find(|[dx, dy]| libm::hypot(*dx, *dy) >= TRAVEL_M);
-        let [dx, dy] = long.unwrap_or([vx, vy]);
-        Some(libm::atan2(dy, dx))
+        self.mix(seconds);
+        for (hypothesis, model) in self.hypotheses.iter_mut().zip(MODELS) {
+            hypothesis.predict(model, seconds);
+        }
     }
 
-    /// Probability that the object exists: half of all single clusters are noise, and each
-    /// further sighting halves the doubt.
-    pub(super) fn existence(&self) -> f64 {
-        1.0 - libm::exp2(-f64::from(self.observations.min(50)))
+    /// Every hypothesis begins with what the others think, as far as they may have turned into it.
+    fn mix(&mut self, seconds: f64) {
+        let share = (seconds / 0.1).min(1.0);
+        let before = self.hypotheses.clone();
+        // Nothing stops at once: the faster it is, the less likely it stands a moment later.
+        let stopping = before.clone().map(|from| {
+            let speed_squared = from.state.fixed_rows::<2>(2).norm_squared();
+            libm::exp(-0.5 * speed_squared / (STOPPING_MPS * STOPPING_MPS))
+        });
+        let turning = |from: usize, to: usize| {
+            let stay = if from == to { 1.0 - share } else { 0.0 };
+            let stops = if from != 0 && to == 0 {
+                stopping[from]
+            } else {
+                1.0
+            };
+            stay + share * stops * TRANSITION[from][to]
+        };
+        for (to, hypothesis) in self.hypotheses.iter_mut().enumerate() {
+            let weights: [f64; 3] =
+                std::array::from_fn(|from| turning(from, to) * before[from].probability);
+            let total: f64 = weights.iter().sum();
+            let mut state = State::zeros();
+            for (weight, other) in weights.iter().zip(&before) {
+                state += other.state * (weight / total);
+            }
+            let mut covariance = Covariance::zeros();
+            for (weight, other) in weights.iter().zip(&before) {
+                let apart = other.state - state;
+                covariance += (other.covariance + apart * apart.transpose()) * (weight / total);
+            }
+            *hypothesis = Hypothesis {
+                state,
+                covariance,
+                probability: total,
+            };
+        }
     }
 
-    /// Takes a position in. The velocity is the difference to the oldest position within
-    /// `baseline_s`, or to the one before if that is all there is.
-    pub(super) fn observe(&mut self, time: Time, position_m: [f64; 2], baseline_s: f64) {
-        if self.observations == 0 {
-            self.first_seen = time;
+    /// Takes a position in.
+    pub(super) fn measure_position(&mut self, position_m: Vector2<f64>, noise: Matrix2<f64>) {
+        let mut likelihoods = [0.0; 3];
+        for (hypothesis, likelihood) in self.hypotheses.iter_mut().zip(&mut likelihoods) {
+            *likelihood = hypothesis.measure_position(position_m, noise);
         }
-        self.observations = self.observations.saturating_add(1);
-        let old = |(then, _): &(Time, [f64; 2])| (time - *then).seconds() > baseline_s + 0.02;
-        while self.positions.len() > 1 && old(&self.positions[0]) {
-            self.positions.remove(0);
-        }
-        if let Some((then, from_m)) = self.positions.first() {
-            let passed_s = (time - *then).seconds();
-            if passed_s >= LEAST_PASSED_S {
-                self.velocity = Velocity {
-                    mps: [0, 1].map(|axis| (position_m[axis] - from_m[axis]) / passed_s),
-                    deviation_mps: std::f64::consts::SQRT_2 * CENTRE_DEVIATION_M / passed_s,
-                    known: true,
-                };
+        self.weigh(likelihoods);
+    }
+
+    /// A wheeled vehicle does not slip: its velocity across `yaw_rad` is 0 within a deviation.
+    pub(super) fn measure_no_slip(&mut self, yaw_rad: f64, deviation_mps: f64) {
+        let (sine, cosine) = libm::sincos(yaw_rad);
+        let mut row = SMatrix::<f64, 1, 5>::zeros();
+        (row[2], row[3]) = (-sine, cosine);
+        for (hypothesis, model) in self.hypotheses.iter_mut().zip(MODELS) {
+            if model != Model::Standing {
+                hypothesis.measure_zero(&row, deviation_mps * deviation_mps);
             }
         }
-        self.positions.push((time, position_m));
     }
+
+    fn weigh(&mut self, likelihoods: [f64; 3]) {
+        /// No hypothesis is ever quite given up.
+        const LEAST: f64 = 1e-4;
+        let mut total = 0.0;
+        for (hypothesis, likelihood) in self.hypotheses.iter_mut().zip(likelihoods) {
+            hypothesis.probability *= likelihood;
+            total += hypothesis.probability;
+        }
+        if total < 1e-30 {
+            // So far off that rounding decides: what moves freely is right.
+            for (hypothesis, probability) in self.hypotheses.iter_mut().zip([0.02, 0.49, 0.49]) {
+                hypothesis.probability = probability;
+            }
+            return;
+        }
+        for hypothesis in &mut self.hypotheses {
+            hypothesis.probability = (hypothesis.probability / total).max(LEAST);
+        }
+    }
+
+    /// Turns and shifts everything with the frame.
+    pub(super) fn reframe(&mut self, sine: f64, cosine: f64, moved: impl Fn([f64; 2]) -> [f64; 2]) {
+        let mut turn = Covariance::identity();
+        for at in [0, 2] {
+            turn[(at, at)] = cosine;
+            turn[(at, at + 1)] = -sine;
+            turn[(at + 1, at)] = sine;
+            turn[(at + 1, at + 1)] = cosine;
+        }
+        for hypothesis in &mut self.hypotheses {
+            let [x, y] = moved([hypothesis.state[0], hypothesis.state[1]]);
+            hypothesis.state = turn * hypothesis.state;
+            (hypothesis.state[0], hypothesis.state[1]) = (x, y);
+            hypothesis.covariance = turn * hypothesis.covariance * turn.transpose();
+        }
+    }
+
+    /// Believes from now on that it stands: what was never seen to move does not begin to where
+    /// nobody sees it.
+    pub(super) fn halt(&mut self) {
+        for (hypothesis, probability) in self.hypotheses.iter_mut().zip([0.98, 0.01, 0.01]) {
+            hypothesis.probability = probability;
+            for at in 2..5 {
+                hypothesis.state[at] = 0.0;
+            }
+        }
+    }
+
+    /// Shifts the place without a motion: the box turned out to be larger than was thought.
+    pub(super) fn shift(&mut self, by_m: Vector2<f64>) {
+        for hypothesis in &mut self.hypotheses {
+            hypothesis.state[0] += by_m.x;
+            hypothesis.state[1] += by_m.y;
+        }
+    }
+
+    pub(super) fn estimate(&self) -> Estimate {
+        let total: f64 = self.hypotheses.iter().map(|one| one.probability).sum();
+        let mut state = State::zeros();
+        for hypothesis in &self.hypotheses {
+            state += hypothesis.state * (hypothesis.probability / total);
+        }
+        let mut covariance = Covariance::zeros();
+        for hypothesis in &self.hypotheses {
+            let apart = hypothesis.state - state;
+            covariance += (hypothesis.covariance + apart * apart.transpose())
+                * (hypothesis.probability / total);
+        }
+        Estimate {
+            position_m: state.fixed_rows::<2>(0).into(),
+            velocity_mps: state.fixed_rows::<2>(2).into(),
+            yaw_rate_radps: state[4],
+            position_covariance: covariance.fixed_view::<2, 2>(0, 0).into(),
+            velocity_covariance: covariance.fixed_view::<2, 2>(2, 2).into(),
+            standing: self.hypotheses[0].probability / total,
+        }
+    }
+}
+
+impl Hypothesis {
+    fn predict(&mut self, model: Model, seconds: f64) {
+        let mut transition = Covariance::identity();
+        match model {
+            Model::Standing => {
+                for at in 2..5 {
+                    transition[(at, at)] = 0.0;
+                }
+                self.state = transition * self.state;
+            }
+            Model::Straight => {
+                (transition[(0, 2)], transition[(1, 3)]) = (seconds, seconds);
+                transition[(4, 4)] = 0.0;
+                self.state = transition * self.state;
+            }
+            Model::Turning => (self.state, transition) = turned(&self.state, seconds),
+        }
+        let (acceleration, turn) = match model {
+            Model::Standing => (0.0, 0.0),
+            Model::Straight => (STRAIGHT_MPS2, 0.0),
+            Model::Turning => (TURNING_MPS2, TURNING_RADPS2),
+        };
+        let mut noise = Covariance::zeros();
+        let (a, t) = (acceleration * acceleration * seconds, seconds);
+        for (at, speed) in [(0, 2), (1, 3)] {
+            // White acceleration (Bar-Shalom, Li, Kirubarajan 2001, section 6.2.2).
+            noise[(at, at)] = a * t * t / 3.0 + DRIFT * DRIFT * t;
+            noise[(at, speed)] = a * t / 2.0;
+            noise[(speed, at)] = a * t / 2.0;
+            noise[(speed, speed)] = a;
+        }
+        noise[(4, 4)] = turn * turn * seconds;
+        if model == Model::Standing {
+            (noise[(2, 2)], noise[(3, 3)]) = (STILL_MPS * STILL_MPS, STILL_MPS * STILL_MPS);
+        }
+        if model != Model::Turning {
+            noise[(4, 4)] = STRAIGHT_RADPS * STRAIGHT_RADPS;
+        }
+        self.covariance = transition * self.covariance * transition.transpose() + noise;
+    }
+
+    /// Gives the likelihood of the position.
+    fn measure_position(&mut self, position_m: Vector2<f64>, noise: Matrix2<f64>) -> f64 {
+        let innovation = position_m - self.state.fixed_rows::<2>(0);
+        let spread = self.covariance.fixed_view::<2, 2>(0, 0) + noise;
+        let determinant = spread.determinant().max(1e-12);
+        let Some(inverse) = spread.try_inverse() else {
+            return 0.0;
+        };
+        let gain = self.covariance.fixed_view::<5, 2>(0, 0) * inverse;
+        self.state += gain * innovation;
+        self.state[4] = self.state[4].clamp(-TIGHTEST_RADPS, TIGHTEST_RADPS);
+        self.covariance -= gain * spread * gain.transpose();
+        self.settle();
+        let squared = (innovation.transpose() * inverse * innovation)[0];
+        libm::exp(-0.5 * squared) / libm::sqrt(determinant)
+    }
+
+    fn measure_zero(&mut self, row: &SMatrix<f64, 1, 5>, variance: f64) {
+        let spread = (row * self.covariance * row.transpose())[0] + variance;
+        let gain = self.covariance * row.transpose() / spread;
+        let measured = (row * self.state)[0];
+        self.state -= gain * measured;
+        self.covariance -= gain * spread * gain.transpose();
+        self.settle();
+    }
+
+    /// Keeps the covariance symmetric and its diagonal positive, against rounding.
+    fn settle(&mut self) {
+        self.covariance = 0.5 * (self.covariance + self.covariance.transpose());
+        for at in 0..5 {
+            self.covariance[(at, at)] = self.covariance[(at, at)].max(1e-8);
+        }
+    }
+}
+
+/// A turn at a constant rate, and its derivative by the state (Bar-Shalom, Li, Kirubarajan 2001,
+/// section 11.7.1).
+fn turned(state: &State, seconds: f64) -> (State, Covariance) {
+    let (vx, vy, rate) = (state[2], state[3], state[4]);
+    let turn = rate * seconds;
+    let (sine, cosine) = libm::sincos(turn);
+    let mut jacobian = Covariance::identity();
+    // Ways ahead and aside for a unit of speed, and their derivatives by the rate.
+    let (ahead, aside, ahead_rate, aside_rate) = if turn.abs() < 1e-4 {
+        let t = seconds;
+        (t, 0.5 * turn * t, -turn * t * t / 3.0, 0.5 * t * t)
+    } else {
+        (
+            sine / rate,
+            (1.0 - cosine) / rate,
+            (turn * cosine - sine) / (rate * rate),
+            (turn * sine - 1.0 + cosine) / (rate * rate),
+        )
+    };
+    jacobian[(0, 2)] = ahead;
+    jacobian[(0, 3)] = -aside;
+    jacobian[(1, 2)] = aside;
+    jacobian[(1, 3)] = ahead;
+    jacobian[(2, 2)] = cosine;
+    jacobian[(2, 3)] = -sine;
+    jacobian[(3, 2)] = sine;
+    jacobian[(3, 3)] = cosine;
+    let next = jacobian * state;
+    jacobian[(0, 4)] = vx * ahead_rate - vy * aside_rate;
+    jacobian[(1, 4)] = vx * aside_rate + vy * ahead_rate;
+    jacobian[(2, 4)] = seconds * (-sine * vx - cosine * vy);
+    jacobian[(3, 4)] = seconds * (cosine * vx - sine * vy);
+    (next, jacobian)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
-    fn drive(baseline_s: f64) -> Motion {
-        let mut motion = Motion::new(0);
-        for revolution in 0..20 {
-            let time = Time::from_micros(100_000 * revolution);
-            // 5 m/s, seen 0.1 m off to either side.
-            let wobble = if revolution % 2 == 0 { 0.1 } else { -0.1 };
-            motion.observe(time, [0.5 * revolution as f64 + wobble, 0.0], baseline_s);
+    fn noise(deviation_m: f64) -> Matrix2<f64> {
+        Matrix2::identity() * deviation_m * deviation_m
+    }
+
+    fn follow(path: impl Fn(f64) -> [f64; 2], seconds: f64) -> Motion {
+        let mut random = Random::new(9);
+        let mut seen = |at_s: f64| {
+            let [x, y] = path(at_s);
+            Vector2::new(x + 0.05 * random.normal(), y + 0.05 * random.normal())
+        };
+        let mut motion = Motion::new(seen(0.0), noise(0.1), 6.0);
+        for revolution in 1..=(seconds * 10.0) as usize {
+            motion.predict(0.1);
+            motion.measure_position(seen(0.1 * revolution as f64), noise(0.1));
         }
         motion
     }
 
     #[test]
-    fn a_longer_baseline_is_calmer() {
-        assert!((drive(0.0).velocity().mps[0] - 3.0).abs() < 1e-9);
-        assert!((drive(0.5).velocity().mps[0] - 4.6).abs() < 1e-9);
-        assert!(drive(0.5).velocity().deviation_mps < drive(0.0).velocity().deviation_mps);
+    fn what_stands_has_no_speed() {
+        let estimate = follow(|_| [3.0, 4.0], 2.0).estimate();
+        assert!(estimate.velocity_mps.norm() < 0.05, "{estimate:?}");
+        assert!(estimate.standing > 0.9);
     }
 
     #[test]
-    fn a_first_sighting_has_no_velocity_and_says_so() {
-        let mut motion = Motion::new(0);
-        motion.observe(Time::ZERO, [3.0, 4.0], 0.5);
-        assert_eq!(motion.velocity().mps, [0.0; 2]);
-        assert!(!motion.velocity().known);
-        assert_eq!(motion.existence(), 0.5);
+    fn a_straight_drive_is_known_after_a_second() {
+        let estimate = follow(|t| [8.0 * t, 1.0], 1.0).estimate();
+        assert!((estimate.velocity_mps.x - 8.0).abs() < 0.4, "{estimate:?}");
+        assert!(estimate.standing < 0.01);
+    }
+
+    #[test]
+    fn a_roundabout_is_a_turn_and_goes_on_unseen() {
+        let round = |t: f64| {
+            let (sine, cosine) = (0.7 * t).sin_cos();
+            [11.0 * cosine, 11.0 * sine]
+        };
+        let motion = follow(round, 3.0);
+        assert!((motion.estimate().yaw_rate_radps - 0.7).abs() < 0.15);
+        let mut unseen = motion.clone();
+        for _ in 0..10 {
+            unseen.predict(0.1);
+        }
+        let later = unseen.estimate();
+        let [x, y] = round(4.0);
+        let missed = later.position_m - Vector2::new(x, y);
+        assert!(missed.norm() < 1.5, "{missed}");
+        assert!(later.position_covariance[(0, 0)] > motion.estimate().position_covariance[(0, 0)]);
+    }
+
+    #[test]
+    fn the_derivative_of_a_turn_is_its_difference() {
+        let state = State::new(1.0, 2.0, 5.0, -3.0, 0.4);
+        let (next, jacobian) = turned(&state, 0.1);
+        for at in 0..5 {
+            let mut moved = state;
+            moved[at] += 1e-6;
+            let difference = (turned(&moved, 0.1).0 - next) / 1e-6;
+            assert!((difference - jacobian.column(at)).norm() < 1e-4, "{at}");
+        }
     }
 }

@@ -74,59 +74,28 @@ impl Rectangle {
         }
     }
 
-    /// Whether a place lies within the rectangle, or within a margin around it.
-    pub(super) fn contains(&self, [x, y]: &[f64; 2], margin_m: f64) -> bool {
+    /// Its corners, one after the other.
+    pub fn corners(&self) -> [[f64; 2]; 4] {
+        let (sine, cosine) = libm::sincos(self.yaw_rad);
+        let [x, y] = self.centre_m;
+        let (u, v) = (0.5 * self.length_m, 0.5 * self.width_m);
+        [(u, v), (-u, v), (-u, -v), (u, -v)]
+            .map(|(u, v)| [x + u * cosine - v * sine, y + u * sine + v * cosine])
+    }
+
+    /// Distance of a place from the rectangle's edge, negative within.
+    pub(super) fn distance_m(&self, [x, y]: [f64; 2]) -> f64 {
         let (sine, cosine) = libm::sincos(self.yaw_rad);
         let offset = [x - self.centre_m[0], y - self.centre_m[1]];
         let [along_m, across_m] = turned(&offset, sine, cosine);
-        libm::fabs(along_m) <= 0.5 * self.length_m + margin_m
-            && libm::fabs(across_m) <= 0.5 * self.width_m + margin_m
-    }
-
-    /// Where it is after some time at a velocity.
-    pub(super) fn moved(self, [vx, vy]: [f64; 2], seconds: f64) -> Self {
-        let [x, y] = self.centre_m;
-        Self {
-            centre_m: [x + vx * seconds, y + vy * seconds],
-            ..self
-        }
-    }
-
-    /// At least so long and so wide, grown away from the sensor: the edges that it sees stay.
-    /// With `from_middle` the length grows to both ends.
-    pub(super) fn grown(self, length_m: f64, width_m: f64, from_middle: bool) -> Self {
-        let (sine, cosine) = libm::sincos(self.yaw_rad);
-        let [x, y] = self.centre_m;
-        let (along_m, across_m) = (x * cosine + y * sine, y * cosine - x * sine);
-        let grow = |size_m: f64, wanted_m: f64, offset_m: f64| {
-            let added_m = (wanted_m - size_m).max(0.0);
-            // Seen end on, an edge that is cut by the line of sight grows to both sides.
-            let side = (offset_m / (0.5 * size_m).max(NEAREST_M)).clamp(-1.0, 1.0);
-            (size_m + added_m, 0.5 * added_m * side)
-        };
-        let along_m = if from_middle { 0.0 } else { along_m };
-        let (length_m, du) = grow(self.length_m, length_m, along_m);
-        let (width_m, dv) = grow(self.width_m, width_m, across_m);
-        Self {
-            centre_m: [x + du * cosine - dv * sine, y + du * sine + dv * cosine],
-            length_m,
-            width_m,
-            ..self
-        }
-    }
-
-    /// Standard deviation of the yaw: known from motion, fair where two sides differ much,
-    /// else anything (uniform over a half turn).
-    pub(super) fn yaw_deviation_rad(&self, moving: bool) -> f64 {
-        const FROM_MOTION_RAD: f64 = 0.15;
-        const FROM_SHAPE_RAD: f64 = 0.3;
-        const UNKNOWN_RAD: f64 = 0.9;
-        if moving {
-            FROM_MOTION_RAD
-        } else if self.length_m > 1.5 * self.width_m {
-            FROM_SHAPE_RAD
+        let out = [
+            libm::fabs(along_m) - 0.5 * self.length_m,
+            libm::fabs(across_m) - 0.5 * self.width_m,
+        ];
+        if out[0] > 0.0 && out[1] > 0.0 {
+            libm::hypot(out[0], out[1])
         } else {
-            UNKNOWN_RAD
+            out[0].max(out[1])
         }
     }
 }
@@ -205,17 +174,18 @@ mod tests {
     }
 
     #[test]
-    fn growing_keeps_the_near_edges() {
-        let seen = Rectangle {
+    fn distances_are_counted_from_the_edge() {
+        let rectangle = Rectangle {
             centre_m: [10.0, 0.0],
-            yaw_rad: 0.0,
-            length_m: 0.2,
-            width_m: 1.8,
+            yaw_rad: std::f64::consts::FRAC_PI_2,
+            length_m: 4.0,
+            width_m: 2.0,
         };
-        let grown = seen.grown(4.2, 1.8, false);
-        assert_eq!((grown.length_m, grown.width_m), (4.2, 1.8));
-        assert!((grown.centre_m[0] - 12.0).abs() < 1e-9);
-        assert!(grown.centre_m[1].abs() < 1e-9);
+        assert!((rectangle.distance_m([10.0, 0.0]) + 1.0).abs() < 1e-9);
+        assert!((rectangle.distance_m([10.0, 3.0]) - 1.0).abs() < 1e-9);
+        assert!((rectangle.distance_m([14.0, 6.0]) - 5.0).abs() < 1e-9);
+        let [x, y] = rectangle.corners()[0];
+        assert!((x - 9.0).abs() < 1e-9 && (y - 2.0).abs() < 1e-9);
     }
 
     #[test]

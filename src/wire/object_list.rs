@@ -57,8 +57,8 @@ super::message! {
     pub struct ObjectList = 2021 "kreisel.ObjectList" {
         /// Counts the revolutions that were answered, from 0.
         1 => revolution: u32,
-        /// 0: the sensor's frame at start, x east, y north; 1: east, north, up around a
-        /// WGS84 reference.
+        /// 0: the sensor's frame, x right, y forward; 1: east, north, up around a WGS84
+        /// reference; 2: a simulation's own frame.
         2 => frame: u32,
         /// Whether a pose of the vehicle was used.
         3 => ego_known: bool,

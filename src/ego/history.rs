@@ -1,0 +1,137 @@
+//! Values over time: between two of them, a little beyond the last, and no farther.
+
+use crate::time::{Span, Time};
+
+/// How much is kept: more than two revolutions at 5 Hz.
+const KEPT: Span = Span::from_micros(1_000_000);
+/// Two values this far apart show how it goes on; nearer ones show their noise.
+const TREND_S: f64 = 0.2;
+
+/// A quantity that can be read between and beyond two of its values.
+pub(super) trait Blend: Copy {
+    /// The value at a share of the way to `other`.
+    fn blend(&self, other: &Self, share: f64) -> Self;
+}
+
+/// Values of the last second, oldest first.
+#[derive(Debug, Clone)]
+pub(super) struct History<T> {
+    values: Vec<(Time, T)>,
+}
+
+impl<T> Default for History<T> {
+    fn default() -> Self {
+        Self { values: vec![] }
+    }
+}
+
+impl<T: Blend> History<T> {
+    pub(super) fn clear(&mut self) {
+        self.values.clear();
+    }
+
+    /// Takes a value in. One that is not later than the last is out of order and no use, unless
+    /// it is so old that time itself must have been set back.
+    pub(super) fn push(&mut self, time: Time, value: T) {
+        if let Some((last, _)) = self.values.last() {
+            if (*last - time) > KEPT {
+                self.values.clear();
+            } else if time <= *last {
+                return;
+            }
+        }
+        self.values.push((time, value));
+        let too_old = |(then, _): &(Time, T)| (time - *then) > KEPT;
+        let old = self
+            .values
+            .iter()
+            .take_while(|entry| too_old(entry))
+            .count();
+        self.values.drain(..old);
+    }
+
+    pub(super) fn last(&self) -> Option<(Time, T)> {
+        self.values.last().copied()
+    }
+
+    /// The value at a time, if one is known no more than `limit` away.
+    pub(super) fn at(&self, time: Time, limit: Span) -> Option<T> {
+        let after = self.values.partition_point(|(then, _)| *then < time);
+        let ((last, latest), (first, _)) = (self.last()?, *self.values.first()?);
+        if time > last {
+            return ((time - last) <= limit).then(|| self.beyond(time, latest));
+        }
+        if time < first {
+            let value = self.values[0].1;
+            return ((first - time) <= limit).then_some(value);
+        }
+        let (then, value) = self.values[after];
+        if then == time || after == 0 {
+            return Some(value);
+        }
+        let (before, from) = self.values[after - 1];
+        let share = (time - before).seconds() / (then - before).seconds();
+        Some(from.blend(&value, share))
+    }
+
+    /// Goes on from the last value as it came there.
+    fn beyond(&self, time: Time, latest: T) -> T {
+        let Some((last, _)) = self.last() else {
+            return latest;
+        };
+        let passed_s = |then: Time| (last - then).seconds();
+        let trend = self.values.iter().rev();
+        let earlier = trend
+            .clone()
+            .find(|(then, _)| passed_s(*then) >= TREND_S)
+            .or(self.values.first());
+        match earlier {
+            Some((then, from)) if passed_s(*then) > 0.0 => {
+                let share = 1.0 + (time - last).seconds() / passed_s(*then);
+                from.blend(&latest, share)
+            }
+            _ => latest,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    impl Blend for f64 {
+        fn blend(&self, other: &Self, share: f64) -> Self {
+            self + share * (other - self)
+        }
+    }
+
+    fn at(milliseconds: i64) -> Time {
+        Time::from_micros(1_000 * milliseconds)
+    }
+
+    const LIMIT: Span = Span::from_micros(500_000);
+
+    #[test]
+    fn between_two_values_it_is_linear_and_beyond_it_goes_on() {
+        let mut history = History::default();
+        for step in 0..6 {
+            history.push(at(100 * step), step as f64);
+        }
+        assert_eq!(history.at(at(250), LIMIT), Some(2.5));
+        assert_eq!(history.at(at(500), LIMIT), Some(5.0));
+        let beyond = history.at(at(700), LIMIT).unwrap();
+        assert!((beyond - 7.0).abs() < 1e-9);
+        assert_eq!(history.at(at(1001), LIMIT), None);
+    }
+
+    #[test]
+    fn disorder_is_passed_over_and_a_clock_set_back_begins_anew() {
+        let mut history = History::default();
+        history.push(at(10_000), 1.0);
+        history.push(at(9_900), 5.0);
+        assert_eq!(history.at(at(10_000), LIMIT), Some(1.0));
+        history.push(at(1_000), 2.0);
+        assert_eq!(history.at(at(1_000), LIMIT), Some(2.0));
+        assert_eq!(history.at(at(10_000), LIMIT), None);
+    }
+}

@@ -1,0 +1,287 @@
+//! The ground where it is no plane: heights above or below the plane, sector by sector and
+//! ring by ring.
+//!
+//! A road bends up and down and falls off to its sides. In every sector the lowest returns of
+//! each layer say how high the ground is there; a chain of them is followed outward from the
+//! plane below the vehicle, and neighbouring sectors vote, so that the side of a car, which
+//! fills a sector or two, is not taken for a rise.
+
+use super::Plane;
+use crate::cloud::{MAX_LAYERS, Scan};
+
+/// Heights of the ground relative to the plane.
+#[derive(Debug, Clone)]
+pub(super) struct Surface {
+    sectors: usize,
+    /// Per sector: its rings from the inside out.
+    rings: Vec<[Ring; MAX_LAYERS]>,
+    voted: Vec<[Ring; MAX_LAYERS]>,
+    /// Sector of every column.
+    sector_of: Vec<u16>,
+    /// Heights and distances of the returns of one layer in one sector.
+    candidates: Vec<(f32, f32)>,
+}
+
+/// Where a layer meets the ground in a sector.
+#[derive(Debug, Clone, Copy, Default)]
+struct Ring {
+    /// Horizontal distance; 0 where nothing is known.
+    distance_m: f32,
+    /// Above the plane.
+    level_m: f32,
+}
+
+/// Part of a layer's returns in a sector that may lie below the ground: noise and reflections.
+const BELOW: f32 = 0.2;
+/// Fewer returns of a layer in a sector say nothing.
+const FEWEST: usize = 3;
+/// Farther rings are too sparse to follow.
+const FARTHEST_M: f32 = 70.0;
+/// Steepest slope against the plane, and how much it may change: at once, and for each metre.
+/// A summit of 150 m radius changes it by 0.0067 each metre.
+const STEEPEST: f32 = 0.15;
+const BEND: f32 = 0.012;
+const BEND_PER_M: f32 = 0.0035;
+const MOST_BEND: f32 = 0.05;
+/// How far a level may be off besides.
+const SLACK_M: f32 = 0.06;
+/// Levels this near to the plane are always possible, kerbs among them; farther ones as far
+/// as this many times the median of their layer, if so many sectors know it.
+const FLAT_M: f32 = 0.07;
+const OFF: f32 = 4.0;
+const FEWEST_SECTORS: usize = 6;
+/// Sectors to either side that vote on a level.
+const VOTERS: usize = 3;
+
+impl Surface {
+    pub(super) fn new(sectors: usize) -> Self {
+        Self {
+            sectors,
+            rings: vec![[Ring::default(); MAX_LAYERS]; sectors],
+            voted: vec![[Ring::default(); MAX_LAYERS]; sectors],
+            sector_of: vec![],
+            candidates: vec![],
+        }
+    }
+
+    /// Follows the ground of a revolution.
+    pub(super) fn find(&mut self, scan: &Scan, plane: &Plane) {
+        self.sector_of.clear();
+        let sectors = self.sectors;
+        self.sector_of.extend((0..scan.columns()).map(|column| {
+            let turns = scan.azimuth_rad(column) / std::f64::consts::TAU;
+            let part = turns - libm::floor(turns);
+            ((part * sectors as f64) as usize).min(sectors - 1) as u16
+        }));
+        for rings in &mut self.rings {
+            *rings = [Ring::default(); MAX_LAYERS];
+        }
+        let mut first = 0;
+        while first < scan.columns() {
+            let sector = self.sector_of[first];
+            let count = self.sector_of[first..]
+                .iter()
+                .take_while(|other| **other == sector)
+                .count();
+            self.measure_sector(scan, plane, first..first + count, sector as usize);
+            first += count;
+        }
+        for rings in &mut self.rings {
+            follow(rings);
+        }
+        self.reject_loners();
+        self.vote();
+    }
+
+    /// Forgets levels that are far off where the ground is flat all around: what stands on a
+    /// flat road is more likely than a hill in one place. A layer's median says how flat it is.
+    fn reject_loners(&mut self) {
+        let mut spread_m = 0.0f32;
+        for layer in 0..MAX_LAYERS {
+            self.candidates.clear();
+            let of_layer = self.rings.iter().map(|rings| rings[layer]);
+            let known = of_layer.filter(|ring| ring.distance_m > 0.0);
+            self.candidates
+                .extend(known.map(|ring| (ring.level_m.abs(), ring.distance_m)));
+            let count = self.candidates.len();
+            if count >= FEWEST_SECTORS {
+                let by_height = |a: &(f32, f32), b: &(f32, f32)| a.0.total_cmp(&b.0);
+                let (_, (median_m, _), _) =
+                    self.candidates.select_nth_unstable_by(count / 2, by_height);
+                spread_m = *median_m;
+            }
+            let most_m = FLAT_M + OFF * spread_m;
+            for rings in &mut self.rings {
+                if rings[layer].level_m.abs() > most_m {
+                    rings[layer] = Ring::default();
+                }
+            }
+        }
+    }
+
+    /// The low level of each layer in the columns of a sector.
+    fn measure_sector(
+        &mut self,
+        scan: &Scan,
+        plane: &Plane,
+        columns: std::ops::Range<usize>,
+        sector: usize,
+    ) {
+        let above_m = plane.heights();
+        for layer in 0..MAX_LAYERS {
+            self.candidates.clear();
+            for column in columns.clone() {
+                let point = scan.index(column, layer);
+                if scan.has_return(point) {
+                    let [x, y, z] = scan.point_m(point);
+                    let distance_m = (x * x + y * y).sqrt();
+                    if distance_m < FARTHEST_M {
+                        self.candidates.push((above_m(x, y, z), distance_m));
+                    }
+                }
+            }
+            if self.candidates.len() < FEWEST {
+                continue;
+            }
+            let low = (self.candidates.len() as f32 * BELOW) as usize;
+            let by_height = |a: &(f32, f32), b: &(f32, f32)| a.0.total_cmp(&b.0);
+            let (_, (level_m, distance_m), _) =
+                self.candidates.select_nth_unstable_by(low, by_height);
+            let ring = &mut self.rings[sector][layer];
+            // A sweep that overlaps itself comes here twice.
+            if ring.distance_m == 0.0 || *level_m < ring.level_m {
+                *ring = Ring {
+                    distance_m: *distance_m,
+                    level_m: *level_m,
+                };
+            }
+        }
+    }
+
+    /// The median of neighbouring sectors' levels, layer by layer.
+    fn vote(&mut self) {
+        let sectors = self.sectors;
+        for sector in 0..sectors {
+            for layer in 0..MAX_LAYERS {
+                let own = self.rings[sector][layer];
+                let mut levels = [0.0f32; 2 * VOTERS + 1];
+                let mut count = 0;
+                let mut distance_m = 0.0;
+                for step in 0..=2 * VOTERS {
+                    let neighbour = (sector + sectors + step - VOTERS) % sectors;
+                    let ring = self.rings[neighbour][layer];
+                    let is_alike = own.distance_m == 0.0
+                        || (ring.distance_m - own.distance_m).abs() < 0.35 * own.distance_m;
+                    if ring.distance_m > 0.0 && is_alike {
+                        levels[count] = ring.level_m;
+                        distance_m += ring.distance_m;
+                        count += 1;
+                    }
+                }
+                self.voted[sector][layer] = if count == 0 || own.distance_m == 0.0 {
+                    Ring::default()
+                } else {
+                    let levels = &mut levels[..count];
+                    let (_, level_m, _) = levels.select_nth_unstable_by(count / 2, f32::total_cmp);
+                    Ring {
+                        distance_m: distance_m / count as f32,
+                        level_m: *level_m,
+                    }
+                };
+            }
+        }
+    }
+
+    /// How high the ground is above the plane, `distance_m` away in a column.
+    pub(super) fn level_m(&self, column: usize, distance_m: f32) -> f32 {
+        let rings = &self.voted[self.sector_of[column] as usize];
+        let (mut inner, mut before) = (Ring::default(), Ring::default());
+        for ring in rings.iter().filter(|ring| ring.distance_m > 0.0) {
+            if ring.distance_m >= distance_m {
+                let share = (distance_m - inner.distance_m) / (ring.distance_m - inner.distance_m);
+                return inner.level_m + share * (ring.level_m - inner.level_m);
+            }
+            if ring.distance_m > inner.distance_m {
+                (before, inner) = (inner, *ring);
+            }
+        }
+        // Beyond the last ring it goes on as it came there, for as far as that was.
+        let run_m = inner.distance_m - before.distance_m;
+        if run_m <= 0.1 {
+            return inner.level_m;
+        }
+        let slope = ((inner.level_m - before.level_m) / run_m).clamp(-STEEPEST, STEEPEST);
+        inner.level_m + slope * (distance_m - inner.distance_m).min(run_m)
+    }
+}
+
+/// Keeps the rings that can be one ground, from the inside out, and forgets the others.
+fn follow(rings: &mut [Ring; MAX_LAYERS]) {
+    let mut last = Ring::default();
+    let mut slope = 0.0f32;
+    for ring in rings {
+        if ring.distance_m == 0.0 {
+            continue;
+        }
+        let run_m = ring.distance_m - last.distance_m;
+        let expected_m = last.level_m + slope * run_m;
+        let bend = (BEND + BEND_PER_M * run_m.max(0.0)).min(MOST_BEND);
+        let is_ground = run_m > 0.3
+            && (ring.level_m - expected_m).abs() < SLACK_M + bend * run_m
+            && (ring.level_m - last.level_m).abs() < SLACK_M + STEEPEST * run_m;
+        if is_ground {
+            // The slope from a short run is noise.
+            let fresh = (ring.level_m - last.level_m) / run_m;
+            let trust = (run_m / 4.0).min(1.0);
+            slope += trust * (fresh - slope);
+            last = *ring;
+        } else {
+            *ring = Ring::default();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::sensor::VLP16;
+    use crate::cloud::tests::scan_of;
+
+    /// A road that is level to 10 m and then rises, with a car's rear across it.
+    fn rising_road(slope: f64) -> Scan {
+        scan_of(1800, |column, layer| {
+            let tangent = VLP16.elevation_deg[layer].to_radians().tan();
+            let cosine = VLP16.elevation_deg[layer].to_radians().cos();
+            let level_m = -1.8 / tangent;
+            // On the rise: z = slope (d - 10) - 1.8 = d tan(v).
+            let rise_m = (-1.8 - 10.0 * slope) / (tangent - slope);
+            let distance_m = if tangent < 0.0 && level_m <= 10.0 {
+                level_m
+            } else if tangent < slope && rise_m > 0.0 {
+                rise_m
+            } else {
+                0.0
+            };
+            let azimuth_deg = column as f64 * 0.2;
+            let is_car = azimuth_deg < 6.0 && distance_m > 20.0;
+            let distance_m = if is_car { 20.0 } else { distance_m };
+            if distance_m < 60.0 {
+                (100.0 * distance_m / cosine).round() as u16
+            } else {
+                0
+            }
+        })
+    }
+
+    #[test]
+    fn a_rise_is_followed_and_a_car_on_it_is_not() {
+        let scan = rising_road(0.06);
+        let mut surface = Surface::new(72);
+        surface.find(&scan, &Plane::level(1.8));
+        for column in [10, 400, 1200] {
+            assert!(surface.level_m(column, 8.0).abs() < 0.1);
+            let level_m = surface.level_m(column, 20.0);
+            assert!((level_m - 0.6).abs() < 0.15, "{column}: {level_m}");
+        }
+    }
+}

@@ -1,0 +1,412 @@
+//! What an object is, from what was seen of it so far.
+//!
+//! Every class has intervals for the measured qualities; outside of one, its probability falls
+//! like a normal distribution. The intervals are sizes of everyday vehicles and people (sources
+//! at the constants); only the roughness of foliage was read off a recording.
+
+/// What a road user is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Class {
+    /// Nobody can tell.
+    Unclassified,
+    /// A passenger car or a van.
+    Car,
+    /// A bicycle with its rider.
+    Cyclist,
+    /// Somebody on foot.
+    Pedestrian,
+    /// A lorry or a bus.
+    LargeVehicle,
+}
+
+impl Class {
+    /// The number on the wire.
+    pub const fn number(self) -> u32 {
+        match self {
+            Self::Unclassified => 0,
+            Self::Car => 1,
+            Self::Cyclist => 2,
+            Self::Pedestrian => 3,
+            Self::LargeVehicle => 4,
+        }
+    }
+
+    /// The word in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Unclassified => "unclassified",
+            Self::Car => "car",
+            Self::Cyclist => "cyclist",
+            Self::Pedestrian => "pedestrian",
+            Self::LargeVehicle => "truck",
+        }
+    }
+}
+
+/// The road users that are told apart, in the order of [`Belief`].
+const ROAD_USERS: [Class; 4] = [
+    Class::Car,
+    Class::Cyclist,
+    Class::Pedestrian,
+    Class::LargeVehicle,
+];
+
+/// What was measured of an object over its life.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Qualities {
+    /// Longer side of what was seen.
+    pub(super) long_m: f64,
+    /// Shorter side.
+    pub(super) short_m: f64,
+    /// Length, once it was seen from end to end.
+    pub(super) whole_m: Option<f64>,
+    /// Extent across the direction in which it moves, once that is known.
+    pub(super) across_m: Option<f64>,
+    /// Greatest extent of what is higher than a bonnet or a handlebar, if any of it was seen.
+    pub(super) upper_m: Option<f64>,
+    /// Top above the ground: at least this...
+    pub(super) top_m: f64,
+    /// ...and at most this, which is where the next ray passed over it.
+    pub(super) top_below_m: f64,
+    /// How much neighbouring returns jump to and fro.
+    pub(super) roughness_m: f64,
+    /// Highest lasting speed.
+    pub(super) speed_mps: f64,
+    /// Whether it was seen to move.
+    pub(super) moved: bool,
+    /// Distance from the sensor.
+    pub(super) range_m: f64,
+    /// Returns on it.
+    pub(super) points: usize,
+    /// Whether it was cut off structure.
+    pub(super) is_suspect: bool,
+}
+
+/// An interval with the standard deviation outside of it.
+struct Within(f64, f64, f64);
+
+impl Within {
+    /// Logarithm of the relative probability of a value.
+    fn log(&self, value: f64) -> f64 {
+        self.log_between(value, value)
+    }
+
+    /// The same for a value that lies somewhere between two bounds.
+    fn log_between(&self, low: f64, high: f64) -> f64 {
+        /// No single quality decides alone.
+        const WORST: f64 = -8.0;
+        let Self(from, to, deviation) = *self;
+        let off = (from - high).max(low - to).max(0.0) / deviation;
+        (-0.5 * off * off).max(WORST)
+    }
+}
+
+/// What is known of a class of road users: sides, top, speed, and how frequent it is.
+struct Profile {
+    long_m: Within,
+    short_m: Within,
+    whole_m: Within,
+    across_m: Within,
+    upper_m: Within,
+    top_m: Within,
+    speed_mps: Within,
+    log_prior: f64,
+}
+
+/// In the order of [`ROAD_USERS`]. Lengths and widths: cars from the smallest to vans, and for a
+/// rear that is all one sees; bicycles with their riders (FGSV, RASt 2006: 1.9 m by 0.8 m at
+/// most); people; lorries and buses up to an articulated one.
+const PROFILES: [Profile; 4] = [
+    Profile {
+        long_m: Within(1.35, 5.3, 0.2),
+        short_m: Within(0.1, 2.1, 0.15),
+        whole_m: Within(3.1, 5.3, 0.3),
+        across_m: Within(0.1, 2.15, 0.15),
+        upper_m: Within(0.95, 5.3, 0.12),
+        top_m: Within(1.25, 2.1, 0.12),
+        speed_mps: Within(0.0, 40.0, 2.0),
+        log_prior: -0.7,
+    },
+    Profile {
+        long_m: Within(0.95, 1.95, 0.14),
+        short_m: Within(0.1, 0.85, 0.12),
+        whole_m: Within(0.3, 1.95, 0.15),
+        across_m: Within(0.1, 0.85, 0.12),
+        upper_m: Within(0.1, 0.95, 0.12),
+        top_m: Within(1.4, 1.95, 0.12),
+        speed_mps: Within(1.9, 8.5, 0.45),
+        log_prior: -1.6,
+    },
+    Profile {
+        long_m: Within(0.2, 0.85, 0.09),
+        short_m: Within(0.05, 0.7, 0.1),
+        whole_m: Within(0.1, 0.95, 0.12),
+        across_m: Within(0.1, 0.85, 0.1),
+        upper_m: Within(0.1, 0.85, 0.1),
+        top_m: Within(1.3, 1.95, 0.12),
+        speed_mps: Within(0.0, 2.3, 0.35),
+        log_prior: -1.6,
+    },
+    Profile {
+        long_m: Within(5.0, 15.0, 1.1),
+        short_m: Within(0.1, 2.8, 0.2),
+        whole_m: Within(5.0, 18.0, 0.5),
+        across_m: Within(0.1, 2.8, 0.2),
+        upper_m: Within(1.3, 15.0, 0.2),
+        top_m: Within(2.3, 4.0, 0.12),
+        speed_mps: Within(0.0, 30.0, 2.0),
+        log_prior: -1.3,
+    },
+];
+
+/// Structure is as frequent as everything else together, and does not move.
+const STRUCTURE_LOG_PRIOR: f64 = -0.9;
+const STRUCTURE_MOVED_LOG: f64 = -4.5;
+/// A few returns from something that stands are rather a piece of structure.
+const FEW: usize = 15;
+const FEW_LOG: f64 = 0.6;
+/// The same for what was cut off structure.
+const SUSPECT_LOG: f64 = 0.8;
+/// Surfaces of vehicles and clothes jump by less than this, foliage by more.
+const SMOOTH_M: Within = Within(0.0, 0.045, 0.018);
+/// Foliage and fences.
+const ROUGH_M: Within = Within(0.05, 1.0, 0.02);
+
+/// Probabilities of the classes, and of being no road user at all.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Belief {
+    road_users: [f64; 4],
+    structure: f64,
+}
+
+impl Belief {
+    /// What is known without any look at it.
+    pub(super) fn unknown() -> Self {
+        let mut belief = Self {
+            road_users: PROFILES.map(|profile| libm::exp(profile.log_prior)),
+            structure: libm::exp(STRUCTURE_LOG_PRIOR),
+        };
+        belief.normalise();
+        belief
+    }
+
+    /// What the qualities alone say.
+    pub(super) fn of(qualities: &Qualities) -> Self {
+        let smooth = SMOOTH_M.log(qualities.roughness_m);
+        // The sides of something far away are seen by a few rays only.
+        let slack_m = 0.004 * qualities.range_m;
+        let road_users = std::array::from_fn(|number| {
+            let profile = &PROFILES[number];
+            let is_thin = matches!(ROAD_USERS[number], Class::Cyclist | Class::Pedestrian);
+            let speed = if qualities.moved {
+                profile.speed_mps.log(qualities.speed_mps)
+            } else if ROAD_USERS[number] == Class::Cyclist {
+                STANDING_CYCLIST_LOG
+            } else {
+                0.0
+            };
+            // A bicycle from behind is as narrow as a person, and limbs and spokes are rough.
+            let long_m = if ROAD_USERS[number] == Class::Cyclist && qualities.moved {
+                Within(0.4, profile.long_m.1, profile.long_m.2)
+            } else {
+                Within(profile.long_m.0, profile.long_m.1, profile.long_m.2)
+            };
+            // What goes on above the highest layer is rather a house than a vehicle.
+            let endless = if qualities.top_below_m == f64::MAX {
+                ENDLESS_LOG
+            } else {
+                0.0
+            };
+            let surface = if is_thin { 0.25 * smooth } else { smooth };
+            // A wall is flat, a vehicle has bumpers, wheels and screens that do not line up.
+            let is_flat = !is_thin && qualities.points >= FEW && qualities.short_m < FLAT_M.0;
+            let short = if is_flat {
+                FLAT_M.log(qualities.short_m)
+            } else {
+                profile.short_m.log(qualities.short_m)
+            };
+            let log = profile.log_prior
+                + long_m.log_between(qualities.long_m, qualities.long_m + slack_m)
+                + short
+                + known(&profile.whole_m, qualities.whole_m)
+                + known(&profile.across_m, qualities.across_m)
+                + known(
+                    &profile.upper_m,
+                    qualities.upper_m.map(|seen_m| seen_m + slack_m),
+                )
+                + profile
+                    .top_m
+                    .log_between(qualities.top_m, qualities.top_below_m)
+                + speed
+                + surface
+                + endless;
+            libm::exp(log)
+        });
+        let moved = if qualities.moved {
+            STRUCTURE_MOVED_LOG
+        } else {
+            0.0
+        };
+        let few = !qualities.moved && qualities.points < FEW;
+        let suspect = !qualities.moved && qualities.is_suspect;
+        let moved =
+            moved + if few { FEW_LOG } else { 0.0 } + if suspect { SUSPECT_LOG } else { 0.0 };
+        let rough = 0.3 * ROUGH_M.log(qualities.roughness_m);
+        let mut belief = Self {
+            road_users,
+            structure: libm::exp(STRUCTURE_LOG_PRIOR + moved + rough.max(-0.5)),
+        };
+        belief.normalise();
+        belief
+    }
+
+    fn normalise(&mut self) {
+        let total = self.road_users.iter().sum::<f64>() + self.structure;
+        for probability in &mut self.road_users {
+            *probability /= total;
+        }
+        self.structure /= total;
+    }
+
+    /// Learns from a further look, a share of the way.
+    pub(super) fn learn(&mut self, fresh: &Self, share: f64) {
+        for (probability, fresh) in self.road_users.iter_mut().zip(fresh.road_users) {
+            *probability += share * (fresh - *probability);
+        }
+        self.structure += share * (fresh.structure - self.structure);
+    }
+
+    /// Probability that it is a road user of any class.
+    pub(super) fn road_user(&self) -> f64 {
+        1.0 - self.structure
+    }
+
+    /// Probability, among road users, of a class with the bulk of a car or more.
+    pub(super) fn vehicle(&self) -> f64 {
+        let [car, _, _, large] = self.road_users;
+        (car + large) / self.road_user().max(1e-9)
+    }
+
+    /// The likeliest class and its probability among road users.
+    pub(super) fn class(&self) -> (Class, f64) {
+        /// Below this nobody can tell.
+        const LEAST: f64 = 0.4;
+        let (number, probability) =
+            self.road_users
+                .iter()
+                .enumerate()
+                .fold((0, 0.0), |best, (number, probability)| {
+                    if *probability > best.1 {
+                        (number, *probability)
+                    } else {
+                        best
+                    }
+                });
+        let share = probability / self.road_user().max(1e-9);
+        if share < LEAST {
+            (Class::Unclassified, 1.0 - share)
+        } else {
+            (ROAD_USERS[number], share)
+        }
+    }
+}
+
+/// Logarithm for a quality that may not be known.
+fn known(within: &Within, value: Option<f64>) -> f64 {
+    value.map_or(0.0, |value| within.log(value))
+}
+
+/// Depth of a vehicle's side with all that does not line up.
+const FLAT_M: Within = Within(0.25, 3.0, 0.07);
+/// Of a road user that reaches out of the sensor's view.
+const ENDLESS_LOG: f64 = -1.5;
+/// Bicycles that stand have mostly no rider.
+const STANDING_CYCLIST_LOG: f64 = -1.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAR: Qualities = Qualities {
+        long_m: 4.2,
+        short_m: 1.6,
+        whole_m: None,
+        across_m: None,
+        upper_m: Some(1.4),
+        top_m: 1.4,
+        top_below_m: 1.7,
+        roughness_m: 0.02,
+        speed_mps: 0.0,
+        moved: false,
+        range_m: 15.0,
+        points: 60,
+        is_suspect: false,
+    };
+
+    #[test]
+    fn everyday_road_users_are_told_apart() {
+        let walker = Qualities {
+            long_m: 0.6,
+            short_m: 0.4,
+            upper_m: Some(0.5),
+            top_m: 1.6,
+            top_below_m: 1.9,
+            speed_mps: 1.4,
+            moved: true,
+            ..CAR
+        };
+        let rider = Qualities {
+            long_m: 1.7,
+            speed_mps: 4.2,
+            ..walker
+        };
+        let from_behind = Qualities {
+            speed_mps: 4.2,
+            ..walker
+        };
+        let bus = Qualities {
+            long_m: 9.0,
+            top_m: 2.6,
+            top_below_m: 3.2,
+            ..CAR
+        };
+        for (qualities, class) in [
+            (CAR, Class::Car),
+            (walker, Class::Pedestrian),
+            (rider, Class::Cyclist),
+            (from_behind, Class::Cyclist),
+            (bus, Class::LargeVehicle),
+        ] {
+            let belief = Belief::of(&qualities);
+            assert_eq!(belief.class().0, class, "{belief:?}");
+            assert!(belief.road_user() > 0.4, "{belief:?}");
+        }
+    }
+
+    #[test]
+    fn hedges_walls_and_poles_are_no_road_users() {
+        let hedge = Qualities {
+            roughness_m: 0.2,
+            short_m: 0.8,
+            ..CAR
+        };
+        let wall = Qualities {
+            long_m: 9.0,
+            top_m: 1.2,
+            top_below_m: 1.4,
+            ..CAR
+        };
+        let pole = Qualities {
+            long_m: 0.2,
+            short_m: 0.1,
+            upper_m: Some(0.2),
+            top_m: 3.0,
+            top_below_m: 3.2,
+            ..CAR
+        };
+        for qualities in [hedge, wall, pole] {
+            let belief = Belief::of(&qualities);
+            assert!(belief.road_user() < 0.2, "{qualities:?} {belief:?}");
+        }
+    }
+}

@@ -1,0 +1,587 @@
+//! The box of an object: what is seen of it in one revolution, and what is known of it by now.
+//!
+//! A sensor sees one or two sides of a vehicle. The edges that face it are measured, the others
+//! follow from the size, which grows with the evidence.
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::Rectangle;
+use super::spots::Spot;
+use crate::cloud::{MAX_LAYERS, Scan};
+use crate::ego::wrapped_rad;
+
+/// A group of returns in the axes of a box.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View {
+    /// Extent along and across the yaw, relative to the origin of the frame.
+    low_m: [f64; 2],
+    high_m: [f64; 2],
+    /// Whether an end is the object's own: it faces the sensor and nothing stands before it.
+    low_is_edge: [bool; 2],
+    high_is_edge: [bool; 2],
+    /// Whether both ends of an axis can be seen, so that its extent is the object's.
+    is_whole: [bool; 2],
+    /// Only a cabin or a rider is seen, which sits in the middle of the length.
+    is_upper: bool,
+    sine: f64,
+    cosine: f64,
+    range_m: f64,
+}
+
+/// Everything that is measured of a group without knowing the object.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Look {
+    /// Middle of the returns.
+    pub(super) middle_m: Vector2<f64>,
+    /// Mean time before the end of the sweep.
+    pub(super) age_s: f64,
+    pub(super) points: usize,
+    pub(super) floor_m: f64,
+    pub(super) top_m: f64,
+    /// Where the next ray passed over the top.
+    pub(super) top_below_m: f64,
+    /// Greatest extent of what is higher than a bonnet or a handlebar, if there is any of it.
+    pub(super) upper_m: Option<f64>,
+    /// Median jump of the range between neighbouring returns of a layer.
+    pub(super) roughness_m: f64,
+    /// From the sensor to the middle.
+    pub(super) range_m: f64,
+    /// Hardly anything below the belt of a vehicle is seen.
+    is_upper: bool,
+    /// Something nearer hides what is to the left or to the right.
+    cut_left: bool,
+    cut_right: bool,
+    sensor_m: Vector2<f64>,
+}
+
+/// What begins higher has lost its wheels and bumpers to the ground, or between two layers.
+const BELT_M: f64 = 0.55;
+/// Share of returns below it that shows a body.
+const LOW_SHARE: f64 = 0.15;
+/// A nearer return by this much beside an object hides a part of it.
+const OCCLUDER_M: f64 = 0.7;
+/// Columns beside an object that are looked at.
+const BESIDE: usize = 3;
+
+impl Look {
+    /// `spots` must not be empty.
+    pub(super) fn at(spots: &[Spot], scan: &Scan, sensor_m: Vector2<f64>) -> Self {
+        let count = spots.len() as f64;
+        let mut middle_m = Vector2::zeros();
+        let (mut age_s, mut floor_m, mut top_m) = (0.0, f64::MAX, f64::MIN);
+        let mut top_point = 0;
+        for spot in spots {
+            middle_m += spot.at_m / count;
+            age_s += spot.age_s / count;
+            floor_m = floor_m.min(spot.above_m);
+            if spot.above_m > top_m {
+                (top_m, top_point) = (spot.above_m, spot.point as usize);
+            }
+        }
+        let range_m = (middle_m - sensor_m).norm();
+        let layer = scan.layer(top_point);
+        let top_below_m = if layer + 1 < MAX_LAYERS && !is_covered(scan, top_point) {
+            top_m + range_m * (scan.slope(layer + 1).0 - scan.slope(layer).0)
+        } else {
+            f64::MAX
+        };
+        let low = spots.iter().filter(|spot| spot.above_m <= BELT_M).count();
+        let [cut_left, cut_right] = cuts(spots, scan, sensor_m, middle_m);
+        Self {
+            middle_m,
+            age_s,
+            points: spots.len(),
+            floor_m,
+            top_m,
+            top_below_m,
+            upper_m: upper_m(spots),
+            roughness_m: roughness_m(spots, scan),
+            range_m,
+            is_upper: (low as f64) < (LOW_SHARE * count).max(2.0),
+            cut_left,
+            cut_right,
+            sensor_m,
+        }
+    }
+
+    /// Whether a part of it is hidden to either side.
+    pub(super) fn is_cut(&self) -> bool {
+        self.cut_left || self.cut_right
+    }
+
+    /// Direction from the sensor, as a unit vector.
+    pub(super) fn sight(&self) -> Vector2<f64> {
+        (self.middle_m - self.sensor_m) / self.range_m.max(0.1)
+    }
+
+    /// The same group in the axes of a yaw.
+    pub(super) fn view(&self, spots: &[Spot], yaw_rad: f64) -> View {
+        let (sine, cosine) = libm::sincos(yaw_rad);
+        let turned = |at: &Vector2<f64>| [at.x * cosine + at.y * sine, at.y * cosine - at.x * sine];
+        let (mut low_m, mut high_m) = ([f64::MAX; 2], [f64::MIN; 2]);
+        for spot in spots {
+            for (axis, along_m) in turned(&spot.at_m).into_iter().enumerate() {
+                low_m[axis] = low_m[axis].min(along_m);
+                high_m[axis] = high_m[axis].max(along_m);
+            }
+        }
+        let sensor = turned(&self.sensor_m);
+        let sight = self.middle_m - self.sensor_m;
+        let left = turned(&Vector2::new(-sight.y, sight.x).normalize());
+        let mut view = View {
+            low_m,
+            high_m,
+            low_is_edge: [false; 2],
+            high_is_edge: [false; 2],
+            is_whole: [false; 2],
+            is_upper: false,
+            sine,
+            cosine,
+            range_m: self.range_m,
+        };
+        for axis in 0..2 {
+            // An end that lies to a hidden side is not the object's own.
+            let hidden = |sign: f64| {
+                (self.cut_left && left[axis] * sign > 0.35)
+                    || (self.cut_right && -left[axis] * sign > 0.35)
+            };
+            let middle_m = 0.5 * (low_m[axis] + high_m[axis]);
+            let reach_m = 0.5 * (high_m[axis] - low_m[axis]);
+            let offset_m = sensor[axis] - middle_m;
+            // The side along this axis shows where the line of sight crosses it.
+            let is_across = left[axis].abs() > 0.35;
+            let faces_low = offset_m < -reach_m;
+            let faces_high = offset_m > reach_m;
+            view.low_is_edge[axis] = (faces_low || is_across) && !hidden(-1.0);
+            view.high_is_edge[axis] = (faces_high || is_across) && !hidden(1.0);
+            // Of an end that faces away only the corner is seen.
+            if faces_low && !(is_across && reach_m > 0.8) {
+                view.high_is_edge[axis] = false;
+            }
+            if faces_high && !(is_across && reach_m > 0.8) {
+                view.low_is_edge[axis] = false;
+            }
+            view.is_whole[axis] = is_across && !hidden(1.0) && !hidden(-1.0);
+        }
+        if self.is_upper {
+            // A cabin or a rider: what is below reaches farther to both ends.
+            view.low_is_edge[0] = false;
+            view.high_is_edge[0] = false;
+            view.is_whole[0] = false;
+            view.is_upper = !self.is_cut();
+        }
+        view
+    }
+}
+
+impl View {
+    /// Length and width of what is seen.
+    pub(super) fn extent_m(&self) -> [f64; 2] {
+        [0, 1].map(|axis| self.high_m[axis] - self.low_m[axis])
+    }
+
+    /// Whether an extent is the whole of its side.
+    pub(super) fn is_whole(&self) -> [bool; 2] {
+        self.is_whole
+    }
+
+    /// Where the middle of a box of this size is, given where it is expected, and how sure
+    /// that is, as a covariance in the local frame.
+    pub(super) fn centre(
+        &self,
+        size_m: [f64; 2],
+        size_deviation_m: [f64; 2],
+        expected_m: Vector2<f64>,
+    ) -> (Vector2<f64>, Matrix2<f64>) {
+        /// Standard deviation of an edge: noise of ranges and roundness of corners.
+        const EDGE_M: f64 = 0.07;
+        /// Share of what is missing below a cabin by which its middle is off the vehicle's.
+        const UPPER: f64 = 0.4;
+        /// What half a step between columns adds for each metre of range.
+        const EDGE_PER_M: f64 = 0.002;
+        let expected = [
+            expected_m.x * self.cosine + expected_m.y * self.sine,
+            expected_m.y * self.cosine - expected_m.x * self.sine,
+        ];
+        let edge_m = EDGE_M + EDGE_PER_M * self.range_m;
+        let mut centre = [0.0; 2];
+        let mut deviation = [0.0; 2];
+        for axis in 0..2 {
+            let (low, high) = (self.low_m[axis], self.high_m[axis]);
+            let half_m = 0.5 * size_m[axis].max(high - low);
+            let unsure_m = 0.5 * size_deviation_m[axis];
+            (centre[axis], deviation[axis]) =
+                match (self.low_is_edge[axis], self.high_is_edge[axis]) {
+                    // Seen from end to end; if it is shorter than known, some of it was missed.
+                    (true, true) => {
+                        let missed_m = half_m - 0.5 * (high - low);
+                        (
+                            expected[axis].clamp(
+                                0.5 * (low + high) - 0.5 * missed_m,
+                                0.5 * (low + high) + 0.5 * missed_m,
+                            ),
+                            edge_m + 0.5 * missed_m,
+                        )
+                    }
+                    (true, false) => (low + half_m, libm::hypot(edge_m, unsure_m)),
+                    (false, true) => (high - half_m, libm::hypot(edge_m, unsure_m)),
+                    (false, false) if self.is_upper && axis == 0 => {
+                        let slack_m = half_m - 0.5 * (high - low);
+                        (0.5 * (low + high), edge_m + UPPER * slack_m)
+                    }
+                    (false, false) => {
+                        let slack_m = half_m - 0.5 * (high - low);
+                        let middle = 0.5 * (low + high);
+                        (
+                            expected[axis].clamp(middle - slack_m, middle + slack_m),
+                            edge_m + slack_m,
+                        )
+                    }
+                };
+        }
+        let local = |u: f64, v: f64| {
+            Vector2::new(
+                u * self.cosine - v * self.sine,
+                u * self.sine + v * self.cosine,
+            )
+        };
+        let turn = Matrix2::new(self.cosine, -self.sine, self.sine, self.cosine);
+        let spread = Matrix2::new(
+            deviation[0] * deviation[0],
+            0.0,
+            0.0,
+            deviation[1] * deviation[1],
+        );
+        (
+            local(centre[0], centre[1]),
+            turn * spread * turn.transpose(),
+        )
+    }
+}
+
+/// Whether something nearer hides what is above a point.
+fn is_covered(scan: &Scan, point: usize) -> bool {
+    let above_m = scan.range_m()[point + 1];
+    above_m > 0.0 && f64::from(above_m) < f64::from(scan.range_m()[point]) - OCCLUDER_M
+}
+
+/// Whether something nearer stands directly to the left and to the right of a group.
+fn cuts(spots: &[Spot], scan: &Scan, sensor_m: Vector2<f64>, middle_m: Vector2<f64>) -> [bool; 2] {
+    let sight = middle_m - sensor_m;
+    let left = Vector2::new(-sight.y, sight.x);
+    let aside = |spot: &&Spot| left.dot(&(spot.at_m - sensor_m)) / (spot.at_m - sensor_m).norm();
+    let by_side = |a: &&Spot, b: &&Spot| aside(a).total_cmp(&aside(b));
+    let ends = [spots.iter().max_by(by_side), spots.iter().min_by(by_side)];
+    let layers = spots.iter().map(|spot| scan.layer(spot.point as usize));
+    let (low, high) = layers.fold((MAX_LAYERS, 0), |(low, high), layer| {
+        (low.min(layer), high.max(layer))
+    });
+    // Azimuths grow clockwise, so that the left is where columns come before.
+    let forward = scan.step_rad() > 0.0;
+    let directions = [!forward, forward];
+    let columns = scan.columns();
+    std::array::from_fn(|side| {
+        let Some(end) = ends[side] else { return false };
+        let point = end.point as usize;
+        let range_m = f64::from(scan.range_m()[point]);
+        (1..=BESIDE).any(|step| {
+            let step = if directions[side] {
+                step
+            } else {
+                columns - step
+            };
+            let next = (scan.column(point) + step) % columns;
+            (low..=high).any(|layer| {
+                let beside_m = scan.range_m()[scan.index(next, layer)];
+                beside_m > 0.0 && f64::from(beside_m) < range_m - OCCLUDER_M
+            })
+        })
+    })
+}
+
+/// Diagonal of the returns above the height of bonnets and handlebars.
+fn upper_m(spots: &[Spot]) -> Option<f64> {
+    const UPPER_M: f64 = 1.1;
+    let upper = spots.iter().filter(|spot| spot.above_m > UPPER_M);
+    let bounds = upper.fold(None, |bounds, spot| {
+        let (low, high, count) = bounds.unwrap_or((spot.at_m, spot.at_m, 0));
+        Some((low.inf(&spot.at_m), high.sup(&spot.at_m), count + 1))
+    });
+    let (low, high, count): (Vector2<f64>, Vector2<f64>, usize) = bounds?;
+    (count >= 2).then(|| (high - low).norm())
+}
+
+/// Median of the second difference of ranges along the layers: surfaces are smooth, leaves and
+/// grass are not.
+fn roughness_m(spots: &[Spot], scan: &Scan) -> f64 {
+    /// More say nothing new.
+    const MOST: usize = 128;
+    /// A jump between two surfaces says nothing of either.
+    const EDGE_M: f32 = 0.6;
+    let mut jumps = [0.0f32; MOST];
+    let mut count = 0;
+    let ranges = scan.range_m();
+    let columns = scan.columns();
+    let stride = spots.len().div_ceil(MOST).max(1);
+    for spot in spots.iter().step_by(stride) {
+        let point = spot.point as usize;
+        let (column, layer) = (scan.column(point), scan.layer(point));
+        let before = ranges[scan.index((column + columns - 1) % columns, layer)];
+        let after = ranges[scan.index((column + 1) % columns, layer)];
+        let here = ranges[point];
+        let near = |other: f32| other > 0.0 && (other - here).abs() < EDGE_M;
+        if near(before) && near(after) {
+            jumps[count] = (before + after - 2.0 * here).abs() * 0.5;
+            count += 1;
+        }
+    }
+    /// Fewer neighbours say nothing; most things are smooth.
+    const FEWEST: usize = 4;
+    if count < FEWEST {
+        return UNKNOWN_ROUGHNESS_M;
+    }
+    let middle = count / 2;
+    let (_, median, _) = jumps[..count].select_nth_unstable_by(middle, f32::total_cmp);
+    f64::from(*median)
+}
+
+const UNKNOWN_ROUGHNESS_M: f64 = 0.03;
+
+/// What is known of an object's direction and size.
+#[derive(Debug, Clone)]
+pub(super) struct Shape {
+    pub(super) yaw_rad: f64,
+    pub(super) yaw_variance: f64,
+    /// Length along and width across the yaw that were seen.
+    pub(super) seen_m: [f64; 2],
+    /// How sure it is that no more than that is there: 0 to 1.
+    pub(super) whole: [f64; 2],
+    pub(super) top_m: f64,
+    pub(super) top_below_m: f64,
+    pub(super) floor_m: f64,
+    /// Whether motion has shown which end is the front.
+    pub(super) front_known: bool,
+    /// Fits in a row that contradict the direction.
+    contradictions: u32,
+}
+
+/// Size of the car whose hidden part is assumed: the average of new cars in Europe (ICCT,
+/// European Vehicle Market Statistics 2019/20).
+pub(super) const CAR_M: [f64; 2] = [4.3, 1.8];
+/// Standard deviation of a car's length and width around it.
+const CAR_DEVIATION_M: [f64; 2] = [0.4, 0.1];
+/// Standard deviation of a direction that nobody knows: uniform over a half turn.
+pub(super) const UNKNOWN_YAW_RAD: f64 = 0.9;
+/// A visible side between these is the front or rear of a car...
+const END_ON_M: std::ops::Range<f64> = 1.3..2.15;
+/// ...if so little of the other is seen.
+const END_ON_DEPTH_M: f64 = 0.9;
+
+impl Shape {
+    /// The shape of a first look.
+    pub(super) fn first(spots: &[Spot], look: &Look, outline: &mut Vec<[f64; 2]>) -> Self {
+        let (mut yaw_rad, deviation_rad) =
+            fitted_yaw(spots, outline).unwrap_or((0.0, UNKNOWN_YAW_RAD));
+        let mut extent = look.view(spots, yaw_rad).extent_m();
+        if extent[0] < extent[1] {
+            yaw_rad = wrapped_rad(yaw_rad + std::f64::consts::FRAC_PI_2);
+            extent.swap(0, 1);
+        }
+        // A side as long as a vehicle is wide is its front or rear.
+        if END_ON_M.contains(&extent[0]) && extent[1] < END_ON_DEPTH_M {
+            yaw_rad = wrapped_rad(yaw_rad + std::f64::consts::FRAC_PI_2);
+            extent.swap(0, 1);
+        }
+        Self {
+            yaw_rad,
+            yaw_variance: deviation_rad * deviation_rad,
+            seen_m: extent,
+            whole: [0.0; 2],
+            top_m: look.top_m,
+            top_below_m: look.top_below_m,
+            floor_m: look.floor_m,
+            front_known: false,
+            contradictions: 0,
+        }
+    }
+
+    /// Length and width to reckon with: of a vehicle at least a car's, until it was seen whole.
+    /// `vehicle` is the probability that it is one.
+    pub(super) fn size_m(&self, vehicle: f64) -> [f64; 2] {
+        [0, 1].map(|axis| {
+            let hidden = (1.0 - self.whole[axis]) * vehicle;
+            let missing_m = (CAR_M[axis] - self.seen_m[axis]).max(0.0);
+            let least_m = if vehicle > 0.5 {
+                [3.2, 1.5][axis]
+            } else {
+                SMALLEST_M
+            };
+            (self.seen_m[axis] + hidden * missing_m).max(least_m)
+        })
+    }
+
+    /// Standard deviations of length and width.
+    pub(super) fn size_deviation_m(&self, vehicle: f64) -> [f64; 2] {
+        [0, 1].map(|axis| {
+            let unsure = (1.0 - self.whole[axis]) * vehicle;
+            0.05 + unsure * CAR_DEVIATION_M[axis]
+        })
+    }
+
+    /// Learns from a further look in the axes of the yaw.
+    pub(super) fn learn(&mut self, view: &View, look: &Look) {
+        /// Sizes grow within a few revolutions and shrink within some seconds.
+        const GROW: f64 = 0.3;
+        const SHRINK: f64 = 0.01;
+        /// Wholes are believed within a few revolutions near the sensor.
+        const WHOLE: f64 = 0.15;
+        const CLEAR_RANGE_M: f64 = 25.0;
+        // Seen askew, a box is longer and wider than the object.
+        let askew_rad = libm::sqrt(self.yaw_variance).min(0.5);
+        let extent = view.extent_m();
+        for axis in 0..2 {
+            let skewed_m = extent[1 - axis] * libm::sin(askew_rad) * 0.5;
+            let fresh_m = (extent[axis] - skewed_m).max(0.05);
+            let gain = if fresh_m > self.seen_m[axis] {
+                GROW
+            } else {
+                SHRINK
+            };
+            let is_whole = view.is_whole()[axis];
+            if fresh_m > self.seen_m[axis] || is_whole {
+                self.seen_m[axis] += gain * (fresh_m - self.seen_m[axis]);
+            }
+            let clear = (CLEAR_RANGE_M / look.range_m.max(1.0)).min(1.0);
+            if is_whole {
+                self.whole[axis] += WHOLE * clear * (1.0 - self.whole[axis]);
+            }
+        }
+        self.check_axes();
+        self.floor_m = self.floor_m.min(look.floor_m);
+        if look.top_m > self.top_m {
+            self.top_m += 0.4 * (look.top_m - self.top_m);
+        }
+        self.top_below_m = self.top_below_m.min(look.top_below_m).max(self.top_m);
+    }
+
+    /// What is wider than any vehicle, or clearly wider than long, was taken for its own end.
+    fn check_axes(&mut self) {
+        /// Wider than a car, or than a lorry, which is higher.
+        const WIDEST_M: f64 = 2.1;
+        const WIDEST_TALL_M: f64 = 2.75;
+        const TALL_M: f64 = 2.3;
+        let widest_m = if self.top_m > TALL_M {
+            WIDEST_TALL_M
+        } else {
+            WIDEST_M
+        };
+        let [length_m, width_m] = self.seen_m;
+        if !self.front_known && width_m > widest_m.max(length_m) {
+            self.yaw_rad = wrapped_rad(self.yaw_rad + std::f64::consts::FRAC_PI_2);
+            self.seen_m.swap(0, 1);
+            self.whole = [0.0; 2];
+        }
+    }
+
+    /// Takes a direction in, as one of four that a box has, or one of two that its length has.
+    pub(super) fn measure_yaw(&mut self, yaw_rad: f64, deviation_rad: f64) {
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let off = yaw_rad - self.yaw_rad;
+        let off = off - quarter * libm::round(off / quarter);
+        // A box that fits the returns may still be wrong; none turns it far at once.
+        const FARTHEST_RAD: f64 = 0.5;
+        const PATIENCE: u32 = 3;
+        if off.abs() < FARTHEST_RAD {
+            self.contradictions = 0;
+            self.correct_yaw(off, deviation_rad);
+        } else if !self.front_known {
+            self.contradictions += 1;
+            if self.contradictions > PATIENCE {
+                self.contradictions = 0;
+                self.yaw_rad = wrapped_rad(self.yaw_rad + off);
+                self.yaw_variance = deviation_rad * deviation_rad;
+                self.seen_m = self.seen_m.map(|side_m| 0.8 * side_m);
+            }
+        }
+    }
+
+    /// Takes the direction of motion in.
+    pub(super) fn measure_course(&mut self, course_rad: f64, deviation_rad: f64, is_fast: bool) {
+        let off = wrapped_rad(course_rad - self.yaw_rad);
+        if !self.front_known {
+            if is_fast {
+                // The first clear motion says where the front is.
+                if off.abs() > 0.6 {
+                    if off.abs() < 2.5 {
+                        self.seen_m = quarter_turned(off, self.seen_m);
+                        self.whole = [0.0; 2];
+                    }
+                    (self.yaw_rad, self.yaw_variance) = (course_rad, deviation_rad * deviation_rad);
+                }
+                self.front_known = true;
+            }
+            return;
+        }
+        let reversing = off.abs() > 2.0;
+        let off = if reversing {
+            wrapped_rad(off + std::f64::consts::PI)
+        } else {
+            off
+        };
+        if off.abs() < 1.0 {
+            self.correct_yaw(off, deviation_rad);
+        } else if is_fast {
+            (self.yaw_rad, self.yaw_variance) = (course_rad, deviation_rad * deviation_rad);
+        }
+    }
+
+    fn correct_yaw(&mut self, off: f64, deviation_rad: f64) {
+        let gain = self.yaw_variance / (self.yaw_variance + deviation_rad * deviation_rad);
+        self.yaw_rad = wrapped_rad(self.yaw_rad + gain * off);
+        self.yaw_variance *= 1.0 - gain;
+    }
+
+    /// The direction after some seconds of turning at a rate.
+    pub(super) fn predict(&mut self, rate_radps: f64, seconds: f64) {
+        /// How fast a direction becomes unsure, rad/√s.
+        const DRIFT: f64 = 0.15;
+        self.yaw_rad = wrapped_rad(self.yaw_rad + rate_radps * seconds);
+        self.yaw_variance =
+            (self.yaw_variance + DRIFT * DRIFT * seconds).min(UNKNOWN_YAW_RAD * UNKNOWN_YAW_RAD);
+    }
+}
+
+/// Nothing on the road is smaller.
+const SMALLEST_M: f64 = 0.3;
+
+/// Length and width after the length turned out to lie across.
+fn quarter_turned(off_rad: f64, seen_m: [f64; 2]) -> [f64; 2] {
+    if (0.8..2.35).contains(&off_rad.abs()) {
+        [seen_m[1], seen_m[0]]
+    } else {
+        seen_m
+    }
+}
+
+/// The direction of a box around a group within a quarter turn, and its standard deviation;
+/// `None` where there is too little to tell.
+pub(super) fn fitted_yaw(spots: &[Spot], outline: &mut Vec<[f64; 2]>) -> Option<(f64, f64)> {
+    /// Shorter sides show no direction.
+    const SHORTEST_M: f64 = 1.0;
+    const FEWEST: usize = 8;
+    if spots.len() < FEWEST {
+        return None;
+    }
+    outline.clear();
+    outline.extend(spots.iter().map(|spot| <[f64; 2]>::from(spot.at_m)));
+    let rectangle = Rectangle::fit(outline, None);
+    if rectangle.length_m < SHORTEST_M {
+        return None;
+    }
+    // The scatter of a side divided by its length, and a grid of 3 degrees.
+    let scatter_m = if rectangle.length_m > 2.2 { 0.15 } else { 0.3 };
+    Some((
+        rectangle.yaw_rad,
+        (scatter_m / rectangle.length_m).max(0.04),
+    ))
+}

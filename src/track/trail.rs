@@ -1,0 +1,81 @@
+//! The way that something went lately, and whether it is one.
+
+use nalgebra::Vector2;
+
+/// The last places of something.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Trail {
+    places_m: [Vector2<f64>; Trail::LONGEST],
+    count: usize,
+}
+
+impl Trail {
+    const LONGEST: usize = 10;
+
+    pub(super) fn push(&mut self, place_m: Vector2<f64>) {
+        if self.count == Self::LONGEST {
+            self.places_m.rotate_left(1);
+            self.count -= 1;
+        }
+        self.places_m[self.count] = place_m;
+        self.count += 1;
+    }
+
+    pub(super) fn reframe(&mut self, moved: impl Fn([f64; 2]) -> [f64; 2]) {
+        for place_m in &mut self.places_m[..self.count] {
+            *place_m = Vector2::from(moved((*place_m).into()));
+        }
+    }
+
+    /// Whether the places lie one after the other on a way, of something so long.
+    pub(super) fn shows_motion(&self, length_m: f64) -> bool {
+        const FEWEST: usize = 4;
+        /// Share of the way that is left from end to end.
+        const STRAIGHT: f64 = 0.75;
+        const LEAST_M: f64 = 0.6;
+        const LEAST_PER_LENGTH: f64 = 0.12;
+        let places_m = &self.places_m[..self.count];
+        let (Some(first), Some(last)) = (places_m.first(), places_m.last()) else {
+            return false;
+        };
+        let way_m: f64 = places_m
+            .windows(2)
+            .map(|two| (two[1] - two[0]).norm())
+            .sum();
+        let net_m = (last - first).norm();
+        places_m.len() >= FEWEST
+            && net_m > LEAST_M + LEAST_PER_LENGTH * length_m
+            && net_m > STRAIGHT * way_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    fn trail(place_m: impl Fn(f64) -> [f64; 2]) -> Trail {
+        let mut trail = Trail::default();
+        for step in 0..20 {
+            trail.push(Vector2::from(place_m(f64::from(step))));
+        }
+        trail
+    }
+
+    #[test]
+    fn a_walk_is_a_way_and_a_change_of_view_is_none() {
+        assert!(trail(|step| [0.14 * step, 3.0]).shows_motion(0.5));
+        let leaps = trail(|step| if step < 15.0 { [0.0, 3.0] } else { [0.8, 3.0] });
+        assert!(!leaps.shows_motion(4.0));
+    }
+
+    #[test]
+    fn scatter_is_no_way() {
+        let mut random = Random::new(4);
+        let mut trail = Trail::default();
+        for _ in 0..200 {
+            trail.push(Vector2::new(0.2 * random.normal(), 0.2 * random.normal()));
+            assert!(!trail.shows_motion(0.5));
+        }
+    }
+}
