@@ -16,7 +16,7 @@ pub use plane::Plane;
 
 use nalgebra::Vector3;
 
-use crate::cloud::Scan;
+use crate::cloud::{MAX_LAYERS, Scan};
 use crate::parameter::{choices, parameters};
 use crate::random::Random;
 use minima::Minima;
@@ -142,6 +142,11 @@ pub struct Ground {
 
 /// Sectors in which the surface is followed, of 5 degrees each.
 const SECTORS: usize = 72;
+/// Height from which on a return may be a foot, and what is added for each metre of distance.
+const FOOT_M: f32 = 0.02;
+const FOOT_PER_M: f32 = 0.0015;
+/// Slope from there to the next return above that no road has.
+const STEEP: f32 = 1.0;
 
 impl Ground {
     /// A ground step that knows nothing yet.
@@ -266,7 +271,37 @@ impl Ground {
             let limit_m = near_m + per_m * range_m[point];
             range_m[point] > 0.0 && above_m <= limit_m && (below || above_m >= -limit_m)
         }));
+        if self.parameters.model == Model::Surface {
+            self.spare_feet(scan);
+        }
         self.mask.iter().filter(|ground| **ground).count()
+    }
+
+    /// Takes the mark off what stands on the ground: a return that is a little too high for it,
+    /// below one that rises steeply from there and is no ground. Feet of people, tyres, bumpers
+    /// and the foot of a wall lie as near to the ground as its own bumps do.
+    fn spare_feet(&mut self, scan: &Scan) {
+        let (x_m, y_m) = (scan.x_m(), scan.y_m());
+        for column in 0..scan.columns() {
+            let mut above: Option<(f32, f32)> = None;
+            for layer in (0..MAX_LAYERS).rev() {
+                let point = scan.index(column, layer);
+                if !scan.has_return(point) {
+                    continue;
+                }
+                let distance_m = (x_m[point] * x_m[point] + y_m[point] * y_m[point]).sqrt();
+                let height_m = self.heights_m[point];
+                let least_m = FOOT_M + FOOT_PER_M * distance_m;
+                let stands = above.is_some_and(|(upper_m, upper_distance_m)| {
+                    height_m > least_m
+                        && upper_m - height_m > STEEP * (upper_distance_m - distance_m).abs()
+                });
+                if stands {
+                    self.mask[point] = false;
+                }
+                above = (!self.mask[point]).then_some((height_m, distance_m));
+            }
+        }
     }
 }
 

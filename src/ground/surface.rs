@@ -135,7 +135,7 @@ impl Surface {
                 if scan.has_return(point) {
                     let [x, y, z] = scan.point_m(point);
                     let distance_m = (x * x + y * y).sqrt();
-                    if distance_m < FARTHEST_M {
+                    if distance_m < FARTHEST_M && !is_steep(scan, column, layer, distance_m, z) {
                         self.candidates.push((above_m(x, y, z), distance_m));
                     }
                 }
@@ -213,6 +213,16 @@ impl Surface {
         let slope = ((inner.level_m - before.level_m) / run_m).clamp(-STEEPEST, STEEPEST);
         inner.level_m + slope * (distance_m - inner.distance_m).min(run_m)
     }
+}
+
+/// Whether the next return above rises steeply from here, as from the foot of a wall.
+fn is_steep(scan: &Scan, column: usize, layer: usize, distance_m: f32, z_m: f32) -> bool {
+    let above = (layer + 1..MAX_LAYERS).map(|layer| scan.index(column, layer));
+    let next = above.into_iter().find(|point| scan.has_return(*point));
+    next.is_some_and(|point| {
+        let [x, y, z] = scan.point_m(point);
+        z - z_m > (x * x + y * y).sqrt() - distance_m
+    })
 }
 
 /// Keeps the rings that can be one ground, from the inside out, and forgets the others.
