@@ -68,6 +68,8 @@ pub(super) struct Qualities {
     pub(super) top_m: f64,
     /// ...and at most this, which is where the next ray passed over it.
     pub(super) top_below_m: f64,
+    /// Share of its columns in which it goes on above.
+    pub(super) goes_on: f64,
     /// How much neighbouring returns jump to and fro.
     pub(super) roughness_m: f64,
     /// Highest lasting speed.
@@ -162,13 +164,16 @@ const PROFILES: [Profile; 4] = [
 /// Structure is as frequent as everything else together, and does not move.
 const STRUCTURE_LOG_PRIOR: f64 = -0.9;
 const STRUCTURE_MOVED_LOG: f64 = -4.5;
-/// A few returns from something that stands are rather a piece of structure.
+/// A few returns from something that stands are rather a piece of structure, the more so the
+/// fewer they are.
 const FEW: usize = 15;
-const FEW_LOG: f64 = 0.6;
+const FEW_LOG: f64 = 0.1;
 /// The same for what was cut off structure.
 const SUSPECT_LOG: f64 = 0.8;
 /// Surfaces of vehicles and clothes jump by less than this, foliage by more.
 const SMOOTH_M: Within = Within(0.0, 0.045, 0.018);
+/// Share of columns in which a road user seems to go on above: what stands close behind it.
+const ENDS: Within = Within(0.0, 0.15, 0.15);
 /// Foliage and fences.
 const ROUGH_M: Within = Within(0.05, 1.0, 0.02);
 
@@ -217,11 +222,13 @@ impl Belief {
             } else {
                 0.0
             };
+            let ends = ENDS.log(qualities.goes_on);
             let surface = if is_thin { 0.25 * smooth } else { smooth };
             // A wall is flat, a vehicle has bumpers, wheels and screens that do not line up.
-            let is_flat = !is_thin && qualities.points >= FEW && qualities.short_m < FLAT_M.0;
+            let deep_m = if qualities.points >= MANY { &DEEP_M } else { &FLAT_M };
+            let is_flat = !is_thin && qualities.points >= FEW && qualities.short_m < deep_m.0;
             let short = if is_flat {
-                FLAT_M.log(qualities.short_m)
+                deep_m.log(qualities.short_m)
             } else {
                 profile.short_m.log(qualities.short_m)
             };
@@ -239,7 +246,8 @@ impl Belief {
                     .log_between(qualities.top_m, qualities.top_below_m)
                 + speed
                 + surface
-                + endless;
+                + endless
+                + ends;
             libm::exp(log)
         });
         let moved = if qualities.moved {
@@ -247,10 +255,13 @@ impl Belief {
         } else {
             0.0
         };
-        let few = !qualities.moved && qualities.points < FEW;
+        let few = if qualities.moved {
+            0.0
+        } else {
+            FEW_LOG * FEW.saturating_sub(qualities.points) as f64
+        };
         let suspect = !qualities.moved && qualities.is_suspect;
-        let moved =
-            moved + if few { FEW_LOG } else { 0.0 } + if suspect { SUSPECT_LOG } else { 0.0 };
+        let moved = moved + few + if suspect { SUSPECT_LOG } else { 0.0 };
         let rough = 0.3 * ROUGH_M.log(qualities.roughness_m);
         let mut belief = Self {
             road_users,
@@ -316,8 +327,11 @@ fn known(within: &Within, value: Option<f64>) -> f64 {
     value.map_or(0.0, |value| within.log(value))
 }
 
-/// Depth of a vehicle's side with all that does not line up.
+/// Depth of a vehicle's side with all that does not line up, as a few returns show it, and as
+/// many do.
 const FLAT_M: Within = Within(0.25, 3.0, 0.07);
+const DEEP_M: Within = Within(0.6, 3.0, 0.13);
+const MANY: usize = 60;
 /// Of a road user that reaches out of the sensor's view.
 const ENDLESS_LOG: f64 = -1.5;
 /// Bicycles that stand have mostly no rider.
@@ -335,6 +349,7 @@ mod tests {
         upper_m: Some(1.4),
         top_m: 1.4,
         top_below_m: 1.7,
+        goes_on: 0.0,
         roughness_m: 0.02,
         speed_mps: 0.0,
         moved: false,

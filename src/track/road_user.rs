@@ -30,6 +30,9 @@ const MOST_ODDS: f64 = 5.0;
 /// Below this nothing is left of it.
 const LEAST_ODDS: f64 = -1.2;
 
+/// An object that is farther than this from where it is said to be is not there.
+const THERE_M: f64 = 2.0;
+
 /// Speeds from which an object counts as moving.
 const MOVING_MPS: f64 = 0.6;
 const FAST_MPS: f64 = 1.5;
@@ -45,6 +48,7 @@ pub(super) struct Track {
     shape: Shape,
     belief: Belief,
     roughness_m: f64,
+    goes_on: f64,
     upper_m: Option<f64>,
     speed_mps: f64,
     /// Whether it was seen to move, and how far.
@@ -84,6 +88,7 @@ impl Track {
             shape,
             belief: Belief::unknown(),
             roughness_m: look.roughness_m,
+            goes_on: look.goes_on,
             upper_m: look.upper_m,
             speed_mps: 0.0,
             moves: false,
@@ -244,6 +249,7 @@ impl Track {
         self.range_m = look.range_m;
         self.floor_z_m = floor_z_m;
         self.roughness_m += 0.2 * (look.roughness_m - self.roughness_m);
+        self.goes_on += 0.2 * (look.goes_on - self.goes_on);
         if let Some(fresh_m) = look.upper_m {
             let known_m = self.upper_m.get_or_insert(fresh_m);
             let gain = if fresh_m > *known_m { 0.3 } else { 0.05 };
@@ -327,6 +333,7 @@ impl Track {
             upper_m: self.upper_m,
             top_m: self.shape.top_m,
             top_below_m: self.shape.top_below_m,
+            goes_on: self.goes_on,
             roughness_m: self.roughness_m,
             speed_mps: self.speed_mps,
             // The end of what is seen of a wall moves, too, but not by its length.
@@ -385,6 +392,8 @@ impl Track {
 
     /// What is published, valid at `end`.
     pub(super) fn object(&self, end: Time) -> Object {
+        if std::env::var("DBGQ").is_ok() { let q = self.qualities(); let h = |v: Option<f64>| v.unwrap_or(-1.0);
+            eprintln!("Q {} {:.0} {:.2} {:.2} {:.2} {:.2} {:.2} {:.2} {:.2} {:.3} {:.2} {} {} {:.1} {} {:.2} {:.2} {:.2} {}", self.id, 10.0*end.seconds(), q.long_m, q.short_m, h(q.whole_m), h(q.across_m), h(q.upper_m), q.top_m, if q.top_below_m > 99.0 {99.0} else {q.top_below_m}, q.roughness_m, q.speed_mps, u8::from(q.moved), u8::from(q.is_suspect), q.range_m, q.points, self.goes_on, self.odds, self.belief.road_user(), self.sightings); }
         let mut later = self.clone();
         later.predict(end);
         let estimate = later.motion.estimate();
@@ -398,6 +407,9 @@ impl Track {
         } else {
             estimate.velocity_mps.norm()
         };
+        // Of a normal distribution in the plane the share within a distance (Rayleigh).
+        let variance = 0.5 * estimate.position_covariance.trace();
+        let there = 1.0 - libm::exp(-0.5 * THERE_M * THERE_M / variance.max(1e-6));
         let existence = 1.0 / (1.0 + libm::exp(-later.odds));
         let height_m = later.shape.top_m.max(0.1);
         let speed_variance = (ahead.transpose() * estimate.velocity_covariance * ahead)[0];
@@ -421,7 +433,7 @@ impl Track {
                 .map(|axis| libm::sqrt(estimate.position_covariance[(axis, axis)])),
             yaw_deviation_rad: libm::sqrt(later.shape.yaw_variance),
             speed_deviation_mps: libm::sqrt(speed_variance),
-            existence: existence * later.belief.road_user(),
+            existence: existence * later.belief.road_user() * there,
             first_seen: self.first_seen,
             last_measured: self.last_measured,
             points: self.points,

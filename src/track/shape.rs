@@ -44,6 +44,8 @@ pub(super) struct Look {
     pub(super) upper_m: Option<f64>,
     /// Median jump of the range between neighbouring returns of a layer.
     pub(super) roughness_m: f64,
+    /// Share of its columns in which it goes on above.
+    pub(super) goes_on: f64,
     /// From the sensor to the middle.
     pub(super) range_m: f64,
     /// Hardly anything below the belt of a vehicle is seen.
@@ -96,6 +98,7 @@ impl Look {
             top_below_m,
             upper_m: upper_m(spots),
             roughness_m: roughness_m(spots, scan),
+            goes_on: goes_on(spots, scan),
             range_m,
             is_upper: (low as f64) < (LOW_SHARE * count).max(2.0),
             cut_left,
@@ -263,6 +266,26 @@ impl View {
 fn is_covered(scan: &Scan, point: usize) -> bool {
     let above_m = scan.range_m()[point + 1];
     above_m > 0.0 && f64::from(above_m) < f64::from(scan.range_m()[point]) - OCCLUDER_M
+}
+
+/// Share of a group's columns in which the ray above its topmost return met something at the
+/// same distance.
+fn goes_on(spots: &[Spot], scan: &Scan) -> f64 {
+    /// Distance within which the next return is of the same thing.
+    const SAME_M: f32 = 0.8;
+    let (mut columns, mut on) = (0u32, 0u32);
+    for (number, spot) in spots.iter().enumerate() {
+        let point = spot.point as usize;
+        let is_top = spots
+            .get(number + 1)
+            .is_none_or(|next| scan.column(next.point as usize) != scan.column(point));
+        if is_top && scan.layer(point) + 1 < MAX_LAYERS {
+            let above_m = scan.range_m()[point + 1];
+            columns += 1;
+            on += u32::from(above_m > 0.0 && (above_m - scan.range_m()[point]).abs() < SAME_M);
+        }
+    }
+    f64::from(on) / f64::from(columns.max(1))
 }
 
 /// Whether something nearer stands directly to the left and to the right of a group.
