@@ -33,6 +33,9 @@ const LEAST_ODDS: f64 = -1.2;
 /// An object that is farther than this from where it is said to be is not there.
 const THERE_M: f64 = 2.0;
 
+/// Returns from which on a place tells a motion.
+const FEWEST_TO_MOVE: usize = 4;
+
 /// Speeds from which an object counts as moving.
 const MOVING_MPS: f64 = 0.6;
 const FAST_MPS: f64 = 1.5;
@@ -236,8 +239,9 @@ impl Track {
         self.keep_near_edges(look, before, after);
         let (centre_m, noise) = self.centre(&view, self.motion.estimate().position_m);
         self.motion.measure_position(centre_m, noise);
-        // What is partly hidden shows the motion of what hides it.
-        if !look.is_cut() {
+        // What is partly hidden shows the motion of what hides it, and a few returns from far
+        // away come from another part of a thing each time.
+        if !look.is_cut() && look.points >= FEWEST_TO_MOVE {
             self.trail_m.push(centre_m);
         }
         self.steer();
