@@ -21,7 +21,7 @@ pub(super) struct View {
     high_is_edge: [bool; 2],
     /// Whether both ends of an axis can be seen, so that its extent is the object's.
     is_whole: [bool; 2],
-    /// Only a cabin or a rider is seen, which sits in the middle of the length.
+    /// Only a cabin or a rider is seen: what is below reaches farther to both ends.
     is_upper: bool,
     sine: f64,
     cosine: f64,
@@ -167,11 +167,8 @@ impl Look {
             view.is_whole[axis] = is_across && !hidden(1.0) && !hidden(-1.0);
         }
         if self.is_upper {
-            // A cabin or a rider: what is below reaches farther to both ends.
-            view.low_is_edge[0] = false;
-            view.high_is_edge[0] = false;
             view.is_whole[0] = false;
-            view.is_upper = !self.is_cut();
+            view.is_upper = true;
         }
         view
     }
@@ -200,6 +197,8 @@ impl View {
         const EDGE_M: f64 = 0.07;
         /// Share of what is missing below a cabin by which its middle is off the vehicle's.
         const UPPER: f64 = 0.4;
+        /// Share of the length that reaches out below a cabin to either end.
+        const INSET: f64 = 0.1;
         /// What half a step between columns adds for each metre of range.
         const EDGE_PER_M: f64 = 0.002;
         let expected = [
@@ -213,8 +212,19 @@ impl View {
             let (low, high) = (self.low_m[axis], self.high_m[axis]);
             let half_m = 0.5 * size_m[axis].max(high - low);
             let unsure_m = 0.5 * size_deviation_m[axis];
+            let is_inset = self.is_upper && axis == 0;
+            let inset_m = if is_inset {
+                (INSET * size_m[axis]).min((half_m - 0.5 * (high - low)).max(0.0))
+            } else {
+                0.0
+            };
+            let edge_m = edge_m + inset_m;
             (centre[axis], deviation[axis]) =
                 match (self.low_is_edge[axis], self.high_is_edge[axis]) {
+                    (true, true) if is_inset => {
+                        let slack_m = half_m - 0.5 * (high - low);
+                        (0.5 * (low + high), edge_m + UPPER * slack_m)
+                    }
                     // Seen from end to end; if it is shorter than known, some of it was missed.
                     (true, true) => {
                         let missed_m = half_m - 0.5 * (high - low);
@@ -226,11 +236,11 @@ impl View {
                             edge_m + 0.5 * missed_m,
                         )
                     }
-                    (true, false) => (low + half_m, libm::hypot(edge_m, unsure_m)),
-                    (false, true) => (high - half_m, libm::hypot(edge_m, unsure_m)),
-                    (false, false) if self.is_upper && axis == 0 => {
-                        let slack_m = half_m - 0.5 * (high - low);
-                        (0.5 * (low + high), edge_m + UPPER * slack_m)
+                    (true, false) => {
+                        (low - inset_m + half_m, libm::hypot(edge_m, unsure_m))
+                    }
+                    (false, true) => {
+                        (high + inset_m - half_m, libm::hypot(edge_m, unsure_m))
                     }
                     (false, false) => {
                         let slack_m = half_m - 0.5 * (high - low);
