@@ -225,7 +225,11 @@ impl Belief {
             let ends = ENDS.log(qualities.goes_on);
             let surface = if is_thin { 0.25 * smooth } else { smooth };
             // A wall is flat, a vehicle has bumpers, wheels and screens that do not line up.
-            let deep_m = if qualities.points >= MANY { &DEEP_M } else { &FLAT_M };
+            let deep_m = if qualities.points >= MANY {
+                &DEEP_M
+            } else {
+                &FLAT_M
+            };
             let is_flat = !is_thin && qualities.points >= FEW && qualities.short_m < deep_m.0;
             let short = if is_flat {
                 deep_m.log(qualities.short_m)

@@ -62,6 +62,8 @@ pub(super) struct Track {
     born_m: Vector2<f64>,
     /// Where its middle was measured lately, the latest last.
     trail_m: Trail,
+    /// The same for its left and right ends, as far as they were seen.
+    end_trails_m: [Trail; 2],
     odds: f64,
     sightings: u32,
     points: usize,
@@ -99,6 +101,7 @@ impl Track {
             is_suspect,
             born_m: look.middle_m,
             trail_m: Trail::default(),
+            end_trails_m: [Trail::default(); 2],
             odds: BIRTH_ODDS,
             sightings: 1,
             points: look.points,
@@ -239,10 +242,17 @@ impl Track {
         self.keep_near_edges(look, before, after);
         let (centre_m, noise) = self.centre(&view, self.motion.estimate().position_m);
         self.motion.measure_position(centre_m, noise);
-        // What is partly hidden shows the motion of what hides it, and a few returns from far
+        // The hidden end of a thing shows the motion of what hides it, and a few returns from far
         // away come from another part of a thing each time.
-        if !look.is_cut() && look.points >= FEWEST_TO_MOVE {
-            self.trail_m.push(centre_m);
+        if look.points >= FEWEST_TO_MOVE {
+            if look.is_cut == [false; 2] {
+                self.trail_m.push(centre_m);
+            }
+            for side in [0, 1] {
+                if !look.is_cut[side] {
+                    self.end_trails_m[side].push(look.ends_m[side]);
+                }
+            }
         }
         self.steer();
         self.odds = (self.odds + SEEN_ODDS).min(MOST_ODDS);
@@ -259,7 +269,7 @@ impl Track {
             let gain = if fresh_m > *known_m { 0.3 } else { 0.05 };
             *known_m += gain * (fresh_m - *known_m);
         }
-        self.note_motion();
+        self.note_motion(look);
         self.belief.learn(&Belief::of(&self.qualities()), 0.3);
     }
 
@@ -308,12 +318,18 @@ impl Track {
 
     /// Notes whether it moves: by speed, and by a trail that is straight and long enough that
     /// no change of view explains it.
-    fn note_motion(&mut self) {
+    fn note_motion(&mut self, look: &Look) {
         let estimate = self.motion.estimate();
         let speed_mps = estimate.velocity_mps.norm();
         let is_moving = estimate.standing < 0.1 && speed_mps > MOVING_MPS;
         let length_m = self.shape.seen_m[0];
-        if is_moving && self.trail_m.shows_motion(length_m) {
+        let shows_motion = match look.is_cut {
+            [false, false] => self.trail_m.shows_motion(length_m),
+            [false, true] => self.end_trails_m[0].shows_motion(length_m),
+            [true, false] => self.end_trails_m[1].shows_motion(length_m),
+            [true, true] => false,
+        };
+        if is_moving && shows_motion {
             self.moves = true;
             let travelled_m = (estimate.position_m - self.born_m).norm();
             self.travelled_m = self.travelled_m.max(travelled_m);
@@ -390,14 +406,45 @@ impl Track {
         self.motion.reframe(sine, cosine, moved);
         self.shape.yaw_rad = crate::ego::wrapped_rad(self.shape.yaw_rad + turn_rad);
         self.trail_m.reframe(moved);
+        for trail_m in &mut self.end_trails_m {
+            trail_m.reframe(moved);
+        }
         self.born_m = Vector2::from(moved(self.born_m.into()));
         self.floor_z_m += rise_m;
     }
 
     /// What is published, valid at `end`.
     pub(super) fn object(&self, end: Time) -> Object {
-        if std::env::var("DBGQ").is_ok() { let q = self.qualities(); let h = |v: Option<f64>| v.unwrap_or(-1.0);
-            eprintln!("Q {} {:.0} {:.2} {:.2} {:.2} {:.2} {:.2} {:.2} {:.2} {:.3} {:.2} {} {} {:.1} {} {:.2} {:.2} {:.2} {}", self.id, 10.0*end.seconds(), q.long_m, q.short_m, h(q.whole_m), h(q.across_m), h(q.upper_m), q.top_m, if q.top_below_m > 99.0 {99.0} else {q.top_below_m}, q.roughness_m, q.speed_mps, u8::from(q.moved), u8::from(q.is_suspect), q.range_m, q.points, self.goes_on, self.odds, self.belief.road_user(), self.sightings); }
+        if std::env::var("DBGQ").is_ok() {
+            let q = self.qualities();
+            let h = |v: Option<f64>| v.unwrap_or(-1.0);
+            eprintln!(
+                "Q {} {:.0} {:.2} {:.2} {:.2} {:.2} {:.2} {:.2} {:.2} {:.3} {:.2} {} {} {:.1} {} {:.2} {:.2} {:.2} {}",
+                self.id,
+                10.0 * end.seconds(),
+                q.long_m,
+                q.short_m,
+                h(q.whole_m),
+                h(q.across_m),
+                h(q.upper_m),
+                q.top_m,
+                if q.top_below_m > 99.0 {
+                    99.0
+                } else {
+                    q.top_below_m
+                },
+                q.roughness_m,
+                q.speed_mps,
+                u8::from(q.moved),
+                u8::from(q.is_suspect),
+                q.range_m,
+                q.points,
+                self.goes_on,
+                self.odds,
+                self.belief.road_user(),
+                self.sightings
+            );
+        }
         let mut later = self.clone();
         later.predict(end);
         let estimate = later.motion.estimate();

@@ -50,9 +50,10 @@ pub(super) struct Look {
     pub(super) range_m: f64,
     /// Hardly anything below the belt of a vehicle is seen.
     is_upper: bool,
+    /// Its leftmost and rightmost returns, seen from the sensor.
+    pub(super) ends_m: [Vector2<f64>; 2],
     /// Something nearer hides what is to the left or to the right.
-    cut_left: bool,
-    cut_right: bool,
+    pub(super) is_cut: [bool; 2],
     sensor_m: Vector2<f64>,
 }
 
@@ -88,7 +89,7 @@ impl Look {
             f64::MAX
         };
         let low = spots.iter().filter(|spot| spot.above_m <= BELT_M).count();
-        let [cut_left, cut_right] = cuts(spots, scan, sensor_m, middle_m);
+        let ends = ends(spots, sensor_m, middle_m);
         Self {
             middle_m,
             age_s,
@@ -101,15 +102,10 @@ impl Look {
             goes_on: goes_on(spots, scan),
             range_m,
             is_upper: (low as f64) < (LOW_SHARE * count).max(2.0),
-            cut_left,
-            cut_right,
+            ends_m: ends.map(|end| end.map_or(middle_m, |end| end.at_m)),
+            is_cut: cuts(spots, ends, scan),
             sensor_m,
         }
-    }
-
-    /// Whether a part of it is hidden to either side.
-    pub(super) fn is_cut(&self) -> bool {
-        self.cut_left || self.cut_right
     }
 
     /// Direction from the sensor, as a unit vector.
@@ -145,8 +141,8 @@ impl Look {
         for axis in 0..2 {
             // An end that lies to a hidden side is not the object's own.
             let hidden = |sign: f64| {
-                (self.cut_left && left[axis] * sign > 0.35)
-                    || (self.cut_right && -left[axis] * sign > 0.35)
+                (self.is_cut[0] && left[axis] * sign > 0.35)
+                    || (self.is_cut[1] && -left[axis] * sign > 0.35)
             };
             let middle_m = 0.5 * (low_m[axis] + high_m[axis]);
             let reach_m = 0.5 * (high_m[axis] - low_m[axis]);
@@ -236,12 +232,8 @@ impl View {
                             edge_m + 0.5 * missed_m,
                         )
                     }
-                    (true, false) => {
-                        (low - inset_m + half_m, libm::hypot(edge_m, unsure_m))
-                    }
-                    (false, true) => {
-                        (high + inset_m - half_m, libm::hypot(edge_m, unsure_m))
-                    }
+                    (true, false) => (low - inset_m + half_m, libm::hypot(edge_m, unsure_m)),
+                    (false, true) => (high + inset_m - half_m, libm::hypot(edge_m, unsure_m)),
                     (false, false) => {
                         let slack_m = half_m - 0.5 * (high - low);
                         let middle = 0.5 * (low + high);
@@ -298,13 +290,17 @@ fn goes_on(spots: &[Spot], scan: &Scan) -> f64 {
     f64::from(on) / f64::from(columns.max(1))
 }
 
-/// Whether something nearer stands directly to the left and to the right of a group.
-fn cuts(spots: &[Spot], scan: &Scan, sensor_m: Vector2<f64>, middle_m: Vector2<f64>) -> [bool; 2] {
+/// The leftmost and the rightmost of a group, seen from the sensor.
+fn ends(spots: &[Spot], sensor_m: Vector2<f64>, middle_m: Vector2<f64>) -> [Option<&Spot>; 2] {
     let sight = middle_m - sensor_m;
     let left = Vector2::new(-sight.y, sight.x);
     let aside = |spot: &&Spot| left.dot(&(spot.at_m - sensor_m)) / (spot.at_m - sensor_m).norm();
     let by_side = |a: &&Spot, b: &&Spot| aside(a).total_cmp(&aside(b));
-    let ends = [spots.iter().max_by(by_side), spots.iter().min_by(by_side)];
+    [spots.iter().max_by(by_side), spots.iter().min_by(by_side)]
+}
+
+/// Whether something nearer stands directly to the left and to the right of a group.
+fn cuts(spots: &[Spot], ends: [Option<&Spot>; 2], scan: &Scan) -> [bool; 2] {
     let layers = spots.iter().map(|spot| scan.layer(spot.point as usize));
     let (low, high) = layers.fold((MAX_LAYERS, 0), |(low, high), layer| {
         (low.min(layer), high.max(layer))
