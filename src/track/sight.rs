@@ -18,6 +18,9 @@ pub(super) struct Sight {
 /// Part of an object's height, from the ground and from its top, that rays may miss.
 const BELOW_M: f64 = 0.3;
 const ABOVE_M: f64 = 0.2;
+/// Above bonnets and handlebars only the middle of the length is certainly filled.
+const BELT_M: f64 = 0.9;
+const CABIN: f64 = 0.4;
 /// Distance by which a ray must end before or behind the box to count.
 const MARGIN_M: f64 = 0.4;
 /// A ray that nothing came back from has most likely passed.
@@ -36,7 +39,13 @@ impl Sight {
         height_m: f64,
     ) -> Self {
         let mut sight = Self::default();
-        let corners = place.corners().map(|corner| placement.sensor_m(corner));
+        let outline =
+            |place: &Rectangle| place.corners().map(|corner| placement.sensor_m(corner));
+        let corners = outline(place);
+        let cabin = outline(&Rectangle {
+            length_m: CABIN * place.length_m,
+            ..*place
+        });
         let Some((first, count)) = columns_of(scan, &corners) else {
             return sight;
         };
@@ -45,15 +54,25 @@ impl Sight {
             let column = (first + step) % scan.columns();
             let azimuth_rad = scan.azimuth_rad(column);
             let (sine, cosine) = libm::sincos(azimuth_rad);
-            let Some((near_m, far_m)) = crossing(&corners, [sine, cosine]) else {
+            let direction = [sine, cosine];
+            let Some(below_belt) = crossing(&corners, direction) else {
                 continue;
             };
+            let above_belt = crossing(&cabin, direction);
             for layer in 0..MAX_LAYERS {
                 let (tangent, cosine) = scan.slope(layer);
-                let above_m = sensor_height_m + near_m * tangent;
+                let above_m = sensor_height_m + below_belt.0 * tangent;
                 if above_m < BELOW_M || above_m > height_m - ABOVE_M {
                     continue;
                 }
+                let crossed = if above_m < BELT_M {
+                    Some(below_belt)
+                } else {
+                    above_belt
+                };
+                let Some((near_m, far_m)) = crossed else {
+                    continue;
+                };
                 sight.rays += 1.0;
                 let range_m = f64::from(scan.range_m()[scan.index(column, layer)]);
                 let reached_m = range_m * cosine;
