@@ -61,6 +61,8 @@ const LONGEST_JOINED_M: f64 = 5.4;
 const LEAST_CLAIM: f64 = 0.3;
 /// Fewer returns are noise.
 const FEWEST_RETURNS: usize = 3;
+/// Returns of a single low layer that show a vehicle.
+const BUMPER_RETURNS: usize = 15;
 /// Cost beyond which a group is not a track: chi-squared of two degrees of freedom at 0.9997,
 /// and the prices for size and spread.
 const GATE: f64 = 16.0;
@@ -397,7 +399,10 @@ impl ObjectTracker {
                 .iter()
                 .any(|place| place.distance_m(group.look.middle_m.into()) < 0.0);
             let spots = &self.spots[group.begin..group.end];
-            let is_low = group.look.top_m < parameters.lowest_object_m;
+            // Of a vehicle that is far away a single layer may show the bumper.
+            let may_be_bumper = spots.len() >= BUMPER_RETURNS
+                && group.look.top_below_m > parameters.lowest_object_m;
+            let is_low = group.look.top_m < parameters.lowest_object_m && !may_be_bumper;
             if is_piece || is_low {
                 continue;
             }

@@ -39,8 +39,7 @@ impl Sight {
         height_m: f64,
     ) -> Self {
         let mut sight = Self::default();
-        let outline =
-            |place: &Rectangle| place.corners().map(|corner| placement.sensor_m(corner));
+        let outline = |place: &Rectangle| place.corners().map(|corner| placement.sensor_m(corner));
         let corners = outline(place);
         let cabin = outline(&Rectangle {
             length_m: CABIN * place.length_m,
