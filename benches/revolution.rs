@@ -151,10 +151,10 @@ fn bench(name: &str, frames: &[Vec<u8>], rounds: usize, unit_us: f64) {
         }),
     );
     let mut ground = Ground::new(&configuration.ground);
-    let mut report = ground.process(&scan);
+    let mut report = ground.process(&scan, &[]);
     row(
         "ground",
-        measure(rounds, |_| report = ground.process(black_box(&scan))),
+        measure(rounds, |_| report = ground.process(black_box(&scan), &[])),
     );
     let mut dbscan = Dbscan::new(&configuration.cluster);
     row(

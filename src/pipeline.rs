@@ -224,7 +224,8 @@ impl Pipeline {
         let swept = Span::from_seconds(-self.scan.duration_s());
         let sweep = self.ego.sweep(revolution.time + swept, revolution.time);
         self.sweep = sweep;
-        let ground = self.ground.process(&self.scan);
+        let expected = self.tracker.expect(revolution.time, &self.sweep);
+        let ground = self.ground.process(&self.scan, expected);
         let clusters = self.clusters.process(&self.scan, self.ground.mask());
         let heights_m = self.ground.heights_m();
         let objects = self

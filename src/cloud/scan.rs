@@ -2,6 +2,7 @@
 
 use super::sensor::{self, Sensor};
 use super::{CloudParameters, Revolution};
+use crate::ego::wrapped_rad;
 use crate::time::Time;
 use std::f64::consts::TAU;
 
@@ -153,6 +154,23 @@ impl Scan {
     /// From one column to the next in radians; negative when azimuths fall.
     pub fn step_rad(&self) -> f64 {
         self.step_rad
+    }
+
+    /// First column and number of columns in which corners in the sensor frame lie; `None`
+    /// where they lie around the sensor itself.
+    pub fn columns_across(&self, corners_m: &[[f64; 2]; 4]) -> Option<(usize, usize)> {
+        let [x, y] = [0, 1].map(|axis| corners_m.iter().map(|corner| corner[axis]).sum::<f64>());
+        let middle_rad = libm::atan2(x, y);
+        let (mut low, mut high) = (f64::MAX, f64::MIN);
+        for [x, y] in corners_m {
+            let off = wrapped_rad(libm::atan2(*x, *y) - middle_rad);
+            (low, high) = (low.min(off), high.max(off));
+        }
+        if high - low > std::f64::consts::PI || self.step_rad <= 0.0 {
+            return None;
+        }
+        let count = ((high - low) / self.step_rad) as usize + 1;
+        Some((self.column_at(middle_rad + low), count.min(self.columns)))
     }
 
     /// The column nearest to an azimuth.

@@ -19,6 +19,7 @@ use nalgebra::Vector3;
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::parameter::{choices, parameters};
 use crate::random::Random;
+use crate::track::Rectangle;
 use minima::Minima;
 use surface::Surface;
 
@@ -87,10 +88,10 @@ parameters! {
         /// Height of the sensor that is taken when no plane was ever plausible.
         fallback_height_m: f64 = 1.9, thesis 2.05, in 0.1..=10.0, "m";
         /// Distance to the ground within which a return belongs to it.
-        mark_distance_m: f64 = 0.13, thesis 0.5, in 0.01..=2.0, "m";
+        mark_distance_m: f64 = 0.12, thesis 0.5, in 0.01..=2.0, "m";
         /// What is added to that distance for each metre of range: a real road bends away
         /// from any plane.
-        mark_distance_per_m: f64 = 0.002, thesis 0.0, in 0.0..=0.1, "m/m";
+        mark_distance_per_m: f64 = 0.001, thesis 0.0, in 0.0..=0.1, "m/m";
         /// Whether everything below the plane is ground, too. It is no road user: it is a
         /// ditch, a slope, or a reflection in a wet road.
         below_is_ground: bool = true, thesis false, "";
@@ -145,6 +146,8 @@ const SECTORS: usize = 72;
 /// Height from which on a return may be a foot, and what is added for each metre of distance.
 const FOOT_M: f32 = 0.02;
 const FOOT_PER_M: f32 = 0.0015;
+/// Height from which on a return in the place of a vehicle is its bumper or a tyre.
+const BUMPER_M: f32 = 0.07;
 /// Slope from there to the next return above that no road has.
 const STEEP: f32 = 1.0;
 
@@ -179,8 +182,9 @@ impl Ground {
         &self.heights_m
     }
 
-    /// Finds the plane of a revolution and marks its points.
-    pub fn process(&mut self, scan: &Scan) -> GroundReport {
+    /// Finds the plane of a revolution and marks its points. `vehicles` are known to be there,
+    /// in the sensor frame, and lift no ground.
+    pub fn process(&mut self, scan: &Scan, vehicles: &[Rectangle]) -> GroundReport {
         let followed = self.last.filter(|_| self.parameters.follow);
         let reference = followed.unwrap_or(Plane::level(0.0));
         self.minima
@@ -212,7 +216,7 @@ impl Ground {
             support: self
                 .minima
                 .support(&plane, self.parameters.inlier_distance_m),
-            points: self.mark(scan, &plane),
+            points: self.mark(scan, &plane, vehicles),
         }
     }
 
@@ -249,7 +253,7 @@ impl Ground {
         }
     }
 
-    fn mark(&mut self, scan: &Scan, plane: &Plane) -> usize {
+    fn mark(&mut self, scan: &Scan, plane: &Plane, vehicles: &[Rectangle]) -> usize {
         let height_m = plane.heights();
         let near_m = self.parameters.mark_distance_m as f32;
         let per_m = self.parameters.mark_distance_per_m as f32;
@@ -259,7 +263,7 @@ impl Ground {
         self.heights_m
             .extend((0..scan.len()).map(|point| height_m(x_m[point], y_m[point], z_m[point])));
         if self.parameters.model == Model::Surface {
-            self.surface.find(scan, plane);
+            self.surface.find(scan, plane, vehicles);
             for point in (0..scan.len()).filter(|point| range_m[*point] > 0.0) {
                 let distance_m = (x_m[point] * x_m[point] + y_m[point] * y_m[point]).sqrt();
                 self.heights_m[point] -= self.surface.level_m(scan.column(point), distance_m);
@@ -273,8 +277,31 @@ impl Ground {
         }));
         if self.parameters.model == Model::Surface {
             self.spare_feet(scan);
+            for vehicle in vehicles {
+                self.spare_vehicle(scan, vehicle);
+            }
         }
         self.mask.iter().filter(|ground| **ground).count()
+    }
+
+    /// Takes the mark off what is clearly above the ground where a vehicle is expected: far
+    /// away a single layer meets its bumper, as high as the ground may be unsure.
+    fn spare_vehicle(&mut self, scan: &Scan, vehicle: &Rectangle) {
+        let Some((first, count)) = scan.columns_across(&vehicle.corners()) else {
+            return;
+        };
+        for column in (first..first + count).map(|column| column % scan.columns()) {
+            for layer in 0..MAX_LAYERS {
+                let point = scan.index(column, layer);
+                let [x, y, _] = scan.point_m(point).map(f64::from);
+                if self.mask[point]
+                    && self.heights_m[point] > BUMPER_M
+                    && vehicle.distance_m([x, y]) < 0.0
+                {
+                    self.mask[point] = false;
+                }
+            }
+        }
     }
 
     /// Takes the mark off what stands on the ground: a return that is a little too high for it,
@@ -331,7 +358,7 @@ mod tests {
     }
 
     fn process(scan: &Scan, profile: Profile) -> GroundReport {
-        Ground::new(&GroundParameters::profile(profile)).process(scan)
+        Ground::new(&GroundParameters::profile(profile)).process(scan, &[])
     }
 
     #[test]
@@ -361,8 +388,8 @@ mod tests {
     #[test]
     fn the_last_good_plane_is_held_when_none_is_plausible() {
         let mut ground = Ground::new(&GroundParameters::profile(Profile::Default));
-        let found = ground.process(&tilted_road(1.6, 0.0));
-        let held = ground.process(&scan_of(1800, |_, _| 0));
+        let found = ground.process(&tilted_road(1.6, 0.0), &[]);
+        let held = ground.process(&scan_of(1800, |_, _| 0), &[]);
         assert_eq!(held.origin, Origin::Held);
         assert_eq!(held.plane, found.plane);
     }
@@ -370,13 +397,13 @@ mod tests {
     #[test]
     fn a_nod_is_followed_and_a_leap_is_not_until_patience_ends() {
         let mut ground = Ground::new(&GroundParameters::profile(Profile::Default));
-        ground.process(&tilted_road(1.6, 0.0));
+        ground.process(&tilted_road(1.6, 0.0), &[]);
         assert_eq!(
-            ground.process(&tilted_road(1.65, 2.0)).origin,
+            ground.process(&tilted_road(1.65, 2.0), &[]).origin,
             Origin::Found
         );
         let leap = tilted_road(2.6, 2.0);
-        let origins: Vec<_> = (0..11).map(|_| ground.process(&leap).origin).collect();
+        let origins: Vec<_> = (0..11).map(|_| ground.process(&leap, &[]).origin).collect();
         assert_eq!(origins[..10], [Origin::Held; 10]);
         assert_eq!(origins[10], Origin::Found);
     }
@@ -385,7 +412,7 @@ mod tests {
     fn road_is_marked_and_walls_are_not() {
         let scan = tilted_road(1.6, 2.0);
         let mut ground = Ground::new(&GroundParameters::profile(Profile::Default));
-        let report = ground.process(&scan);
+        let report = ground.process(&scan, &[]);
         assert_eq!(
             report.points,
             ground.mask().iter().filter(|mark| **mark).count()

@@ -8,6 +8,7 @@
 
 use super::Plane;
 use crate::cloud::{MAX_LAYERS, Scan};
+use crate::track::Rectangle;
 
 /// Heights of the ground relative to the plane.
 #[derive(Debug, Clone)]
@@ -20,6 +21,8 @@ pub(super) struct Surface {
     sector_of: Vec<u16>,
     /// Heights and distances of the returns of one layer in one sector.
     candidates: Vec<(f32, f32)>,
+    /// Vehicles in the sector that is looked at.
+    vehicles: Vec<Rectangle>,
 }
 
 /// Where a layer meets the ground in a sector.
@@ -50,6 +53,11 @@ const SLACK_M: f32 = 0.06;
 const FLAT_M: f32 = 0.07;
 const OFF: f32 = 4.0;
 const FEWEST_SECTORS: usize = 6;
+/// How much farther off the ground of the next layer may be than that of the last.
+const SPREAD_M: f32 = 0.03;
+const SPREAD: f32 = 2.0;
+/// Around a vehicle that is known, for its way during the sweep.
+const AROUND_VEHICLES_M: f64 = 0.6;
 /// Sectors to either side that vote on a level.
 const VOTERS: usize = 3;
 
@@ -61,11 +69,12 @@ impl Surface {
             voted: vec![[Ring::default(); MAX_LAYERS]; sectors],
             sector_of: vec![],
             candidates: vec![],
+            vehicles: vec![],
         }
     }
 
     /// Follows the ground of a revolution.
-    pub(super) fn find(&mut self, scan: &Scan, plane: &Plane) {
+    pub(super) fn find(&mut self, scan: &Scan, plane: &Plane, vehicles: &[Rectangle]) {
         self.sector_of.clear();
         let sectors = self.sectors;
         self.sector_of.extend((0..scan.columns()).map(|column| {
@@ -83,6 +92,7 @@ impl Surface {
                 .iter()
                 .take_while(|other| **other == sector)
                 .count();
+            self.look_out(scan.azimuth_rad(first + count / 2), vehicles);
             self.measure_sector(scan, plane, first..first + count, sector as usize);
             first += count;
         }
@@ -108,7 +118,7 @@ impl Surface {
                 let by_height = |a: &(f32, f32), b: &(f32, f32)| a.0.total_cmp(&b.0);
                 let (_, (median_m, _), _) =
                     self.candidates.select_nth_unstable_by(count / 2, by_height);
-                spread_m = *median_m;
+                spread_m = median_m.min(SPREAD_M + SPREAD * spread_m);
             }
             let most_m = FLAT_M + OFF * spread_m;
             for rings in &mut self.rings {
@@ -117,6 +127,20 @@ impl Surface {
                 }
             }
         }
+    }
+
+    /// Notes the vehicles that a sector may meet.
+    fn look_out(&mut self, azimuth_rad: f64, vehicles: &[Rectangle]) {
+        let (sine, cosine) = libm::sincos(azimuth_rad);
+        let slack = libm::sin(std::f64::consts::PI / self.sectors as f64);
+        let may_meet = |vehicle: &&Rectangle| {
+            let [x, y] = vehicle.centre_m;
+            let reach_m = 0.5 * (vehicle.length_m + vehicle.width_m) + slack * libm::hypot(x, y);
+            x * sine + y * cosine > 0.0 && (x * cosine - y * sine).abs() < reach_m
+        };
+        self.vehicles.clear();
+        self.vehicles
+            .extend(vehicles.iter().filter(may_meet).copied());
     }
 
     /// The low level of each layer in the columns of a sector.
@@ -135,7 +159,15 @@ impl Surface {
                 if scan.has_return(point) {
                     let [x, y, z] = scan.point_m(point);
                     let distance_m = (x * x + y * y).sqrt();
-                    if distance_m < FARTHEST_M && !is_steep(scan, column, layer, distance_m, z) {
+                    let place_m = [f64::from(x), f64::from(y)];
+                    let is_taken = self
+                        .vehicles
+                        .iter()
+                        .any(|vehicle| vehicle.distance_m(place_m) < AROUND_VEHICLES_M);
+                    if distance_m < FARTHEST_M
+                        && !is_taken
+                        && !is_steep(scan, column, layer, distance_m, z)
+                    {
                         self.candidates.push((above_m(x, y, z), distance_m));
                     }
                 }
@@ -287,7 +319,7 @@ mod tests {
     fn a_rise_is_followed_and_a_car_on_it_is_not() {
         let scan = rising_road(0.06);
         let mut surface = Surface::new(72);
-        surface.find(&scan, &Plane::level(1.8));
+        surface.find(&scan, &Plane::level(1.8), &[]);
         for column in [10, 400, 1200] {
             assert!(surface.level_m(column, 8.0).abs() < 0.1);
             let level_m = surface.level_m(column, 20.0);

@@ -145,6 +145,7 @@ pub struct Tracker {
     by_object: ObjectTracker,
     by_distance: NearestTracker,
     last_sweep: Option<Sweep>,
+    expected: Vec<Rectangle>,
 }
 
 impl Tracker {
@@ -155,6 +156,7 @@ impl Tracker {
             by_object: ObjectTracker::default(),
             by_distance: NearestTracker::default(),
             last_sweep: None,
+            expected: vec![],
         }
     }
 
@@ -171,6 +173,20 @@ impl Tracker {
             Method::Objects => self.by_object.objects(),
             Method::Nearest => self.by_distance.objects(),
         }
+    }
+
+    /// Where vehicles that drive will be at `end`, in the sensor frame of a sweep: what is met
+    /// there is no ground.
+    pub fn expect(&mut self, end: Time, sweep: &Sweep) -> &[Rectangle] {
+        self.expected.clear();
+        let is_known = self
+            .last_sweep
+            .is_some_and(|last| last.epoch == sweep.epoch);
+        if is_known && self.parameters.method == Method::Objects {
+            self.by_object
+                .expect(end, &sweep.sensor, &mut self.expected);
+        }
+        &self.expected
     }
 
     /// Takes the clusters of a revolution in. `heights_m` are its points' heights above the

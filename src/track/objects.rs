@@ -1,5 +1,7 @@
 //! One revolution for all tracks: what is whose, what is new, what is hidden, what is gone.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::Vector2;
 
 use super::assignment::assign;
@@ -79,6 +81,25 @@ impl ObjectTracker {
 
     pub(super) fn objects(&self) -> &[Object] {
         &self.objects
+    }
+
+    /// Adds the boxes of vehicles that drive, as they will be at a time, seen from the sensor.
+    pub(super) fn expect(&self, end: Time, sensor: &Pose, boxes: &mut Vec<Rectangle>) {
+        let placement = sensor.placement();
+        let driving = self
+            .tracks
+            .iter()
+            .filter(|track| track.is_confirmed() && track.is_moving_vehicle());
+        boxes.extend(driving.map(|track| {
+            let mut later = track.clone();
+            later.predict(end);
+            let place = later.rectangle();
+            Rectangle {
+                centre_m: placement.sensor_m(place.centre_m),
+                yaw_rad: wrapped_rad(place.yaw_rad - sensor.yaw_rad + FRAC_PI_2),
+                ..place
+            }
+        }));
     }
 
     /// The frame changed: what was at `from` is now at `to`.

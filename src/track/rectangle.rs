@@ -84,7 +84,7 @@ impl Rectangle {
     }
 
     /// Distance of a place from the rectangle's edge, negative within.
-    pub(super) fn distance_m(&self, [x, y]: [f64; 2]) -> f64 {
+    pub fn distance_m(&self, [x, y]: [f64; 2]) -> f64 {
         let (sine, cosine) = libm::sincos(self.yaw_rad);
         let offset = [x - self.centre_m[0], y - self.centre_m[1]];
         let [along_m, across_m] = turned(&offset, sine, cosine);

@@ -45,7 +45,7 @@ impl Sight {
             length_m: CABIN * place.length_m,
             ..*place
         });
-        let Some((first, count)) = columns_of(scan, &corners) else {
+        let Some((first, count)) = scan.columns_across(&corners) else {
             return sight;
         };
         let stride = count.div_ceil(MOST_COLUMNS).max(1);
@@ -103,28 +103,6 @@ impl Sight {
     pub(super) fn is_empty(&self) -> bool {
         self.passed >= 0.6 * (self.rays - self.blocked)
     }
-}
-
-/// First column and number of columns in which corners lie; `None` around the sensor itself.
-fn columns_of(scan: &Scan, corners: &[[f64; 2]; 4]) -> Option<(usize, usize)> {
-    let bearing = |corner: &[f64; 2]| libm::atan2(corner[0], corner[1]);
-    let middle_rad = {
-        let sum = corners
-            .iter()
-            .fold([0.0; 2], |sum, at| [sum[0] + at[0], sum[1] + at[1]]);
-        bearing(&sum)
-    };
-    let (mut low, mut high) = (f64::MAX, f64::MIN);
-    for corner in corners {
-        let off = crate::ego::wrapped_rad(bearing(corner) - middle_rad);
-        (low, high) = (low.min(off), high.max(off));
-    }
-    if high - low > std::f64::consts::PI || scan.step_rad() <= 0.0 {
-        return None;
-    }
-    let first = scan.column_at(middle_rad + low);
-    let count = ((high - low) / scan.step_rad()) as usize + 1;
-    Some((first, count.min(scan.columns())))
 }
 
 /// Where a direction from the origin crosses a convex outline.
