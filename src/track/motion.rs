@@ -23,7 +23,8 @@ enum Model {
 
 const MODELS: [Model; 3] = [Model::Standing, Model::Straight, Model::Turning];
 
-/// Probability of each hypothesis after a tenth of a second, given the one before.
+/// Probability of each hypothesis after a measurement, given the one before. They mix with
+/// measurements rather than with time: a car that is hidden goes on turning.
 const TRANSITION: [[f64; 3]; 3] = [
     [0.975, 0.015, 0.010],
     [0.010, 0.940, 0.050],
@@ -110,15 +111,13 @@ impl Motion {
         if seconds <= 0.0 {
             return;
         }
-        self.mix(seconds);
         for (hypothesis, model) in self.hypotheses.iter_mut().zip(MODELS) {
             hypothesis.predict(model, seconds);
         }
     }
 
     /// Every hypothesis begins with what the others think, as far as they may have turned into it.
-    fn mix(&mut self, seconds: f64) {
-        let share = (seconds / 0.1).min(1.0);
+    fn mix(&mut self) {
         let before = self.hypotheses.clone();
         // Nothing stops at once: the faster it is, the less likely it stands a moment later.
         let stopping = before.clone().map(|from| {
@@ -126,13 +125,12 @@ impl Motion {
             libm::exp(-0.5 * speed_squared / (STOPPING_MPS * STOPPING_MPS))
         });
         let turning = |from: usize, to: usize| {
-            let stay = if from == to { 1.0 - share } else { 0.0 };
             let stops = if from != 0 && to == 0 {
                 stopping[from]
             } else {
                 1.0
             };
-            stay + share * stops * TRANSITION[from][to]
+            stops * TRANSITION[from][to]
         };
         for (to, hypothesis) in self.hypotheses.iter_mut().enumerate() {
             let weights: [f64; 3] =
@@ -162,6 +160,7 @@ impl Motion {
             *likelihood = hypothesis.measure_position(position_m, noise);
         }
         self.weigh(likelihoods);
+        self.mix();
     }
 
     /// A wheeled vehicle does not slip: its velocity across `yaw_rad` is 0 within a deviation.
