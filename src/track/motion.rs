@@ -27,8 +27,8 @@ const MODELS: [Model; 3] = [Model::Standing, Model::Straight, Model::Turning];
 /// measurements rather than with time: a car that is hidden goes on turning.
 const TRANSITION: [[f64; 3]; 3] = [
     [0.975, 0.015, 0.010],
-    [0.010, 0.940, 0.050],
-    [0.010, 0.050, 0.940],
+    [0.010, 0.960, 0.030],
+    [0.010, 0.020, 0.970],
 ];
 /// What a new object does.
 const AT_BIRTH: [f64; 3] = [0.5, 0.25, 0.25];
