@@ -424,6 +424,61 @@ mod tests {
     }
 
     #[test]
+    fn the_foot_of_a_wall_is_no_ground_and_the_road_before_it_is() {
+        // Layer 2 meets the wall 8 cm above the ground.
+        let wall_m = (1.8 - 0.08) / VLP16.elevation_deg[2].to_radians().tan().abs();
+        let scan = scan_of(1800, |column, layer| {
+            let elevation = VLP16.elevation_deg[layer].to_radians();
+            let road_m = -1.8 / elevation.tan();
+            let is_wall = column < 200 && !(0.0..wall_m).contains(&road_m);
+            let distance_m = if is_wall { wall_m } else { road_m };
+            if (1.0..100.0).contains(&distance_m) {
+                (100.0 * distance_m / elevation.cos()).round() as u16
+            } else {
+                0
+            }
+        });
+        let mut ground = Ground::new(&GroundParameters::profile(Profile::Default));
+        ground.process(&scan, &[]);
+        assert!(!ground.mask()[scan.index(100, 2)]);
+        assert!(ground.mask()[scan.index(100, 1)]);
+        assert!(ground.mask()[scan.index(900, 2)]);
+    }
+
+    #[test]
+    fn a_bumper_where_a_vehicle_is_expected_is_no_ground() {
+        // 12 cm above the road, 20 m ahead, and nothing above it.
+        let bumper_m = (1.8 - 0.12) / VLP16.elevation_deg[5].to_radians().tan().abs();
+        let scan = scan_of(1800, |column, layer| {
+            let elevation = VLP16.elevation_deg[layer].to_radians();
+            let is_bumper = layer == 5 && (column < 10 || column >= 1790);
+            let distance_m = if is_bumper {
+                bumper_m
+            } else {
+                -1.8 / elevation.tan()
+            };
+            if (1.0..100.0).contains(&distance_m) {
+                (100.0 * distance_m / elevation.cos()).round() as u16
+            } else {
+                0
+            }
+        });
+        let car = Rectangle {
+            centre_m: [0.0, bumper_m + 1.5],
+            yaw_rad: std::f64::consts::FRAC_PI_2,
+            length_m: 4.0,
+            width_m: 1.8,
+        };
+        let mut ground = Ground::new(&GroundParameters::profile(Profile::Default));
+        let bumper = scan.index(5, 5);
+        ground.process(&scan, &[]);
+        assert!(ground.mask()[bumper]);
+        ground.process(&scan, &[car]);
+        assert!(!ground.mask()[bumper]);
+        assert!(ground.mask()[scan.index(900, 5)]);
+    }
+
+    #[test]
     fn the_same_seed_gives_the_same_plane() {
         let scan = tilted_road(1.9, 1.0);
         assert_eq!(

@@ -1,0 +1,219 @@
+//! Poses from every service's messages: units, gaps, jumps, loss and return.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use kreisel::ego::geodesy::{Geodetic, LocalFrame};
+use kreisel::ego::{Ego, EgoParameters, Frame, Heard, HeadingUnit, Sweep};
+use kreisel::parameter::Profile;
+use kreisel::time::{Span, Time};
+use kreisel::wire::Envelope;
+use kreisel::wire::Message;
+use kreisel::wire::envelope::Postmark;
+use kreisel::wire::pose::{
+    ApplanixGroup1, Geolocation, GeodeticHeadingReading, GeodeticWgs84Reading, SimulationFrame,
+};
+
+const GOTHENBURG: Geodetic = Geodetic {
+    latitude_deg: 57.7,
+    longitude_deg: 11.9,
+    altitude_m: 50.0,
+};
+
+fn at(seconds: f64) -> Time {
+    Time::from_micros(1_700_000_000_000_000) + Span::from_seconds(seconds)
+}
+
+fn hear(ego: &mut Ego, seconds: f64, message: &impl Message) -> Heard {
+    let mut frame = vec![];
+    let postmark = Postmark {
+        sent: at(seconds),
+        sampled: at(seconds),
+        sender_stamp: 0,
+    };
+    postmark.put(&mut frame, message);
+    let (envelope, _) = Envelope::from_datagram(&frame).unwrap();
+    ego.hear(&envelope).unwrap()
+}
+
+fn ego() -> Ego {
+    Ego::new(&EgoParameters::profile(Profile::Default))
+}
+
+fn sweep(ego: &mut Ego, end_s: f64) -> Sweep {
+    ego.sweep(at(end_s - 0.1), at(end_s))
+}
+
+/// An Applanix fix east and north of the first one.
+fn fix(east_m: f64, north_m: f64, heading_deg: f64) -> ApplanixGroup1 {
+    let place = LocalFrame::around(GOTHENBURG).geodetic([east_m, north_m, 0.0]);
+    ApplanixGroup1 {
+        lat: place.latitude_deg,
+        lon: place.longitude_deg,
+        alt: place.altitude_m,
+        heading: heading_deg,
+        ..ApplanixGroup1::default()
+    }
+}
+
+fn yaw_after(unit: HeadingUnit, headings: &[f32]) -> f64 {
+    let mut ego = Ego::new(&EgoParameters {
+        heading_unit: unit,
+        ..EgoParameters::profile(Profile::Default)
+    });
+    for (step, heading) in headings.iter().enumerate() {
+        let seconds = 0.01 * step as f64;
+        let place = GeodeticWgs84Reading {
+            latitude: GOTHENBURG.latitude_deg,
+            longitude: GOTHENBURG.longitude_deg,
+        };
+        hear(&mut ego, seconds, &place);
+        let heading = GeodeticHeadingReading {
+            north_heading: *heading,
+        };
+        hear(&mut ego, seconds, &heading);
+    }
+    sweep(&mut ego, 0.01 * (headings.len() - 1) as f64)
+        .vehicle
+        .unwrap()
+        .yaw_rad
+}
+
+#[test]
+fn headings_are_clockwise_from_north_in_degrees_or_radians() {
+    let west_rad = PI;
+    for headings in [[269.9f32, 270.0], [-1.5706, -1.570_796_4]] {
+        let yaw_rad = yaw_after(HeadingUnit::Auto, &headings);
+        assert!((yaw_rad.abs() - west_rad).abs() < 1e-3, "{yaw_rad}");
+    }
+    // A small number is either; the setting decides.
+    let degrees = yaw_after(HeadingUnit::Degrees, &[1.5, 1.5]);
+    assert!((degrees - (FRAC_PI_2 - 1.5f64.to_radians())).abs() < 1e-4);
+    let radians = yaw_after(HeadingUnit::Radians, &[1.5, 1.5]);
+    assert!((radians - (FRAC_PI_2 - 1.5)).abs() < 1e-4);
+}
+
+#[test]
+fn places_lie_east_and_north_of_the_first_fix() {
+    let mut ego = ego();
+    hear(&mut ego, 0.0, &fix(0.0, 0.0, 90.0));
+    hear(&mut ego, 0.1, &fix(1.0, 0.5, 90.0));
+    let pose = sweep(&mut ego, 0.1).vehicle.unwrap();
+    let [x, y, _] = pose.position_m;
+    assert!((x - 1.0).abs() < 1e-3 && (y - 0.5).abs() < 1e-3, "{pose:?}");
+    assert!(pose.yaw_rad.abs() < 1e-6);
+}
+
+#[test]
+fn each_column_has_the_pose_of_its_own_time() {
+    let mut ego = ego();
+    for step in 0..=20 {
+        let seconds = 0.01 * f64::from(step);
+        hear(&mut ego, seconds, &fix(10.0 * seconds, 0.0, 90.0));
+    }
+    let sweep = sweep(&mut ego, 0.2);
+    assert_eq!(sweep.frame, Frame::Earth);
+    for (share, east_m) in [(0.0, 1.0), (0.25, 1.25), (1.0, 2.0)] {
+        let [x, ..] = sweep.pose(share).position_m;
+        assert!((x - east_m).abs() < 5e-3, "{share}: {x}");
+    }
+}
+
+#[test]
+fn poses_are_carried_on_to_a_limit_and_found_again() {
+    let mut ego = ego();
+    for step in 0..=10 {
+        let seconds = 0.01 * f64::from(step);
+        hear(&mut ego, seconds, &fix(10.0 * seconds, 0.0, 90.0));
+    }
+    let known = sweep(&mut ego, 0.1);
+    let carried = sweep(&mut ego, 0.4);
+    let [x, ..] = carried.vehicle.unwrap().position_m;
+    assert!((x - 4.0).abs() < 0.05, "{x}");
+    assert_eq!(carried.epoch, known.epoch);
+
+    let lost = sweep(&mut ego, 0.9);
+    assert_eq!((lost.frame, lost.vehicle), (Frame::Sensor, None));
+    assert_ne!(lost.epoch, known.epoch);
+
+    hear(&mut ego, 1.0, &fix(10.0, 0.0, 90.0));
+    let found = sweep(&mut ego, 1.0);
+    assert_eq!(found.frame, Frame::Earth);
+    assert_ne!(found.epoch, lost.epoch);
+}
+
+#[test]
+fn a_jump_begins_a_new_epoch_and_a_drive_does_not() {
+    let mut ego = ego();
+    for step in 0..100 {
+        let seconds = 0.1 * f64::from(step);
+        hear(&mut ego, seconds, &fix(14.0 * seconds, 0.0, 90.0));
+    }
+    let before = sweep(&mut ego, 9.9).epoch;
+    assert_eq!(ego.jumps(), 0);
+    hear(&mut ego, 10.0, &fix(145.0, 0.0, 90.0));
+    assert_ne!(sweep(&mut ego, 10.0).epoch, before);
+    hear(&mut ego, 10.1, &fix(146.4, 0.0, 170.0));
+    assert_eq!(ego.jumps(), 2);
+}
+
+#[test]
+fn the_most_trusted_source_is_used_and_a_simulation_keeps_its_own_frame() {
+    let mut ego = ego();
+    let frame = SimulationFrame {
+        x: 3.0,
+        y: 4.0,
+        yaw: 0.5,
+        ..SimulationFrame::default()
+    };
+    hear(&mut ego, 0.0, &frame);
+    let simulated = sweep(&mut ego, 0.0);
+    assert_eq!(simulated.frame, Frame::Simulation);
+    assert_eq!(simulated.vehicle.unwrap().position_m, [3.0, 4.0, 0.0]);
+
+    let geolocation = Geolocation {
+        latitude: GOTHENBURG.latitude_deg,
+        longitude: GOTHENBURG.longitude_deg,
+        altitude: 50.0,
+        heading: 0.0,
+    };
+    hear(&mut ego, 0.01, &geolocation);
+    let fused = sweep(&mut ego, 0.01);
+    assert_eq!(fused.frame, Frame::Earth);
+    assert_ne!(fused.epoch, simulated.epoch);
+}
+
+#[test]
+fn what_is_no_pose_on_the_earth_is_refused() {
+    let mut ego = ego();
+    let wild = [
+        fix(0.0, 0.0, f64::NAN),
+        ApplanixGroup1 {
+            lat: 91.0,
+            ..fix(0.0, 0.0, 0.0)
+        },
+        ApplanixGroup1 {
+            lon: f64::INFINITY,
+            ..fix(0.0, 0.0, 0.0)
+        },
+    ];
+    for message in &wild {
+        assert_eq!(hear(&mut ego, 0.0, message), Heard::Implausible);
+    }
+    assert_eq!(sweep(&mut ego, 0.0).vehicle, None);
+}
+
+#[test]
+fn a_mounted_sensor_stands_where_it_is_mounted() {
+    let mut ego = Ego::new(&EgoParameters {
+        sensor_forward_m: 1.0,
+        sensor_left_m: 0.5,
+        sensor_yaw_deg: 90.0,
+        ..EgoParameters::profile(Profile::Default)
+    });
+    hear(&mut ego, 0.0, &fix(0.0, 0.0, 0.0));
+    let sweep = sweep(&mut ego, 0.0);
+    let [x, y, _] = sweep.sensor.position_m;
+    assert!((x + 0.5).abs() < 1e-6 && (y - 1.0).abs() < 1e-6);
+    assert!((sweep.sensor.yaw_rad.abs() - PI).abs() < 1e-6);
+}
