@@ -1,0 +1,163 @@
+//! Identities when the world is hidden, when poses are lost, and when nothing moves.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_2;
+
+use kreisel::config::Configuration;
+use kreisel::parameter::Profile;
+use kreisel::pipeline::{Outcome, Pipeline};
+use kreisel::simulate::scenario;
+use kreisel::simulate::{Simulation, TrueObject, Truth};
+use kreisel::track::Object;
+use kreisel::wire::Recording;
+
+/// Farther off is another object.
+const MATCH_M: f64 = 2.0;
+
+fn pipeline() -> Pipeline {
+    Pipeline::new(&Configuration::profile(Profile::Default), 0)
+}
+
+/// Feeds frames; poses only if they are wanted.
+fn feed(pipeline: &mut Pipeline, frames: &[u8], with_poses: bool) {
+    for item in Recording::new(frames) {
+        let envelope = item.unwrap().envelope;
+        let is_cloud = envelope.data_type == 49;
+        if is_cloud || with_poses {
+            let outcome = pipeline.handle(&envelope).unwrap();
+            assert_eq!(is_cloud, matches!(outcome, Outcome::Revolution(_)));
+        }
+    }
+}
+
+/// The id of the object at a road user's place, `place_m` being where an object stands in the
+/// world.
+fn id_of(
+    user: &TrueObject,
+    objects: &[Object],
+    place_m: impl Fn(&Object) -> [f64; 2],
+) -> Option<u32> {
+    let near = objects.iter().map(|object| {
+        let [x, y] = place_m(object);
+        let distance_m = (x - user.centre_m[0]).hypot(y - user.centre_m[1]);
+        (distance_m, object.id)
+    });
+    let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0));
+    nearest
+        .filter(|(distance_m, _)| *distance_m < MATCH_M)
+        .map(|(_, id)| id)
+}
+
+fn in_frame(object: &Object) -> [f64; 2] {
+    [object.centre_m[0], object.centre_m[1]]
+}
+
+/// Where an object in the sensor frame stands in the world.
+fn from_sensor(truth: &Truth) -> impl Fn(&Object) -> [f64; 2] {
+    let (sine, cosine) = (truth.sensor_yaw_rad - FRAC_PI_2).sin_cos();
+    let [x, y, _] = truth.sensor_m;
+    move |object| {
+        let [right, ahead, _] = object.centre_m;
+        [
+            x + right * cosine - ahead * sine,
+            y + right * sine + ahead * cosine,
+        ]
+    }
+}
+
+#[test]
+fn nothing_moves_where_everything_is_parked() {
+    let Some(path) = common::data("vlp16-parked-car-85rev.rec") else {
+        return;
+    };
+    let bytes = std::fs::read(path).unwrap();
+    let mut pipeline = pipeline();
+    let mut revolutions = 0;
+    for item in Recording::new(&bytes) {
+        let envelope = item.unwrap().envelope;
+        let Ok(Outcome::Revolution(_)) = pipeline.handle(&envelope) else {
+            continue;
+        };
+        revolutions += 1;
+        let movers: Vec<_> = pipeline
+            .objects()
+            .iter()
+            .filter(|object| object.speed_mps.abs() > 0.5)
+            .collect();
+        assert!(revolutions <= 10 || movers.is_empty(), "{movers:?}");
+    }
+    assert!(revolutions > 80);
+}
+
+#[test]
+fn ids_survive_the_loss_and_the_return_of_poses() {
+    const LOST: std::ops::Range<u32> = 70..100;
+    let mut kept = 0;
+    let mut changed = 0;
+    for seed in [11, 12, 13] {
+        let mut simulation = Simulation::new(scenario::find("roundabout").unwrap(), seed);
+        let mut pipeline = pipeline();
+        let mut ids: BTreeMap<u32, u32> = BTreeMap::new();
+        for revolution in 0..120 {
+            let mut frames = vec![];
+            let truth = simulation.revolve(&mut frames);
+            feed(&mut pipeline, &frames, !LOST.contains(&revolution));
+            // What is carried on ends after half a second.
+            let has_pose = !(LOST.start + 5..LOST.end).contains(&revolution);
+            let is_switch = [LOST.start + 10, LOST.end + 5].contains(&revolution);
+            for user in truth.objects.iter().filter(|user| user.points >= 20) {
+                let found = if has_pose {
+                    id_of(user, pipeline.objects(), in_frame)
+                } else {
+                    id_of(user, pipeline.objects(), from_sensor(&truth))
+                };
+                let Some(id) = found else { continue };
+                match ids.insert(user.id, id) {
+                    Some(before) if is_switch && before == id => kept += 1,
+                    Some(before) if is_switch && before != id => changed += 1,
+                    _ => {}
+                }
+            }
+        }
+    }
+    println!("{kept} ids kept, {changed} changed");
+    assert!(kept >= 10 && changed * 10 <= kept, "{kept} {changed}");
+}
+
+#[test]
+fn what_is_hidden_is_predicted_and_keeps_its_id() {
+    let (mut kept, mut lost) = (0, 0);
+    let mut predicted = 0;
+    for seed in [11, 12, 13] {
+        let mut simulation = Simulation::new(scenario::find("occlusion").unwrap(), seed);
+        let mut pipeline = pipeline();
+        // For every road user its last id and how long it has been hidden since.
+        let mut last: BTreeMap<u32, (u32, u32)> = BTreeMap::new();
+        for _ in 0..250 {
+            let mut frames = vec![];
+            let truth = simulation.revolve(&mut frames);
+            feed(&mut pipeline, &frames, true);
+            for user in &truth.objects {
+                let found = id_of(user, pipeline.objects(), in_frame);
+                let (id, hidden) = last.get(&user.id).copied().unwrap_or((u32::MAX, 0));
+                if user.points == 0 {
+                    last.insert(user.id, (id, hidden + 1));
+                    let held = pipeline.objects().iter().find(|object| object.id == id);
+                    predicted += u32::from(held.is_some_and(|object| !object.measured));
+                } else if let (Some(now), true) = (found, user.points >= 5) {
+                    if id != u32::MAX && (5..=23).contains(&hidden) {
+                        kept += u32::from(now == id);
+                        lost += u32::from(now != id);
+                    }
+                    last.insert(user.id, (now, 0));
+                }
+            }
+        }
+    }
+    println!("{kept} kept, {lost} lost, predicted in {predicted} revolutions");
+    assert!(predicted > 30, "{predicted}");
+    assert!(kept >= 8 && kept >= 4 * lost, "{kept} kept, {lost} lost");
+}
