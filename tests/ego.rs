@@ -4,14 +4,14 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use kreisel::ego::geodesy::{Geodetic, LocalFrame};
-use kreisel::ego::{Ego, EgoParameters, Frame, Heard, HeadingUnit, Sweep};
+use kreisel::ego::{Ego, EgoParameters, Frame, HeadingUnit, Heard, Sweep};
 use kreisel::parameter::Profile;
 use kreisel::time::{Span, Time};
 use kreisel::wire::Envelope;
 use kreisel::wire::Message;
 use kreisel::wire::envelope::Postmark;
 use kreisel::wire::pose::{
-    ApplanixGroup1, Geolocation, GeodeticHeadingReading, GeodeticWgs84Reading, SimulationFrame,
+    ApplanixGroup1, GeodeticHeadingReading, GeodeticWgs84Reading, Geolocation, SimulationFrame,
 };
 
 const GOTHENBURG: Geodetic = Geodetic {

@@ -223,6 +223,12 @@ impl Belief {
                 0.0
             };
             let ends = ENDS.log(qualities.goes_on);
+            // Posts as high as a person are rarer than posts that are lower or higher.
+            let is_upright = ROAD_USERS[number] == Class::Pedestrian
+                && qualities.points >= MANY_FOR_A_PERSON
+                && profile.top_m.log_between(qualities.top_m, qualities.top_m) == 0.0
+                && qualities.top_below_m < profile.top_m.1 + 0.1;
+            let upright = if is_upright { UPRIGHT_LOG } else { 0.0 };
             let surface = if is_thin { 0.25 * smooth } else { smooth };
             // A wall is flat, a vehicle has bumpers, wheels and screens that do not line up.
             let deep_m = if qualities.points >= MANY {
@@ -251,7 +257,8 @@ impl Belief {
                 + speed
                 + surface
                 + endless
-                + ends;
+                + ends
+                + upright;
             libm::exp(log)
         });
         let moved = if qualities.moved {
@@ -336,6 +343,9 @@ fn known(within: &Within, value: Option<f64>) -> f64 {
 const FLAT_M: Within = Within(0.25, 3.0, 0.07);
 const DEEP_M: Within = Within(0.6, 3.0, 0.13);
 const MANY: usize = 60;
+/// What speaks for a person where the height is one's, and the returns that show it.
+const UPRIGHT_LOG: f64 = 0.6;
+const MANY_FOR_A_PERSON: usize = 20;
 /// Of a road user that reaches out of the sensor's view.
 const ENDLESS_LOG: f64 = -1.5;
 /// Bicycles that stand have mostly no rider.

@@ -307,7 +307,7 @@ impl Track {
                 .measure_course(course_rad, deviation_rad, is_fast);
         }
         /// Slip of tyres, and of a direction that is not quite right.
-        const SLIP_MPS: f64 = 0.3;
+        const SLIP_MPS: f64 = 0.6;
         let rolls = self.belief.vehicle() > 0.6 && self.shape.yaw_variance < 0.03;
         if rolls && self.shape.front_known && speed_mps > FAST_MPS {
             let unsure_mps = speed_mps * libm::sqrt(self.shape.yaw_variance);

@@ -461,7 +461,11 @@ impl Shape {
     pub(super) fn learn(&mut self, view: &View, look: &Look) {
         /// Sizes grow within a few revolutions and shrink within some seconds.
         const GROW: f64 = 0.3;
-        const SHRINK: f64 = 0.01;
+        const SHRINK: f64 = 0.03;
+        /// What no vehicle can be is forgotten at once.
+        const CORRECT: f64 = 0.2;
+        const TOP_UP: f64 = 0.4;
+        const TOP_DOWN: f64 = 0.1;
         /// Wholes are believed within a few revolutions near the sensor.
         const WHOLE: f64 = 0.15;
         const CLEAR_RANGE_M: f64 = 25.0;
@@ -476,8 +480,14 @@ impl Shape {
             } else {
                 SHRINK
             };
+            let is_too_wide = axis == 1 && self.seen_m[1] > self.widest_m();
+            let gain = if is_too_wide && fresh_m < self.seen_m[1] {
+                CORRECT
+            } else {
+                gain
+            };
             let is_whole = view.is_whole()[axis];
-            if fresh_m > self.seen_m[axis] || is_whole {
+            if fresh_m > self.seen_m[axis] || is_whole || is_too_wide {
                 self.seen_m[axis] += gain * (fresh_m - self.seen_m[axis]);
             }
             let clear = (CLEAR_RANGE_M / look.range_m.max(1.0)).min(1.0);
@@ -488,24 +498,30 @@ impl Shape {
         self.check_axes();
         self.floor_m = self.floor_m.min(look.floor_m);
         if look.top_m > self.top_m {
-            self.top_m += 0.4 * (look.top_m - self.top_m);
+            self.top_m += TOP_UP * (look.top_m - self.top_m);
+        } else if look.top_below_m < self.top_m {
+            // A ray passed where it was thought to be: that was the crown of a tree.
+            self.top_m += TOP_DOWN * (look.top_below_m - self.top_m);
         }
         self.top_below_m = self.top_below_m.min(look.top_below_m).max(self.top_m);
     }
 
-    /// What is wider than any vehicle, or clearly wider than long, was taken for its own end.
-    fn check_axes(&mut self) {
-        /// Wider than a car, or than a lorry, which is higher.
+    /// Greatest width of a car, or of a lorry, which is higher.
+    fn widest_m(&self) -> f64 {
         const WIDEST_M: f64 = 2.1;
         const WIDEST_TALL_M: f64 = 2.75;
         const TALL_M: f64 = 2.3;
-        let widest_m = if self.top_m > TALL_M {
+        if self.top_m > TALL_M {
             WIDEST_TALL_M
         } else {
             WIDEST_M
-        };
+        }
+    }
+
+    /// What is wider than any vehicle, or clearly wider than long, was taken for its own end.
+    fn check_axes(&mut self) {
         let [length_m, width_m] = self.seen_m;
-        if !self.front_known && width_m > widest_m.max(length_m) {
+        if !self.front_known && width_m > self.widest_m().max(length_m) {
             self.yaw_rad = wrapped_rad(self.yaw_rad + std::f64::consts::FRAC_PI_2);
             self.seen_m.swap(0, 1);
             self.whole = [0.0; 2];
