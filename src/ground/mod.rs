@@ -451,7 +451,7 @@ mod tests {
         let bumper_m = (1.8 - 0.12) / VLP16.elevation_deg[5].to_radians().tan().abs();
         let scan = scan_of(1800, |column, layer| {
             let elevation = VLP16.elevation_deg[layer].to_radians();
-            let is_bumper = layer == 5 && (column < 10 || column >= 1790);
+            let is_bumper = layer == 5 && !(10..1790).contains(&column);
             let distance_m = if is_bumper {
                 bumper_m
             } else {

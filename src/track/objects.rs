@@ -10,7 +10,7 @@ use super::shape::Look;
 use super::sight::Sight;
 use super::spots::{Patch, Placer, Spot};
 use super::{Object, Rectangle, Scene, TrackParameters};
-use crate::cloud::Scan;
+use crate::cloud::{MAX_LAYERS, Scan};
 use crate::cluster::Clusters;
 use crate::ego::{Pose, wrapped_rad};
 use crate::time::{Span, Time};
@@ -51,6 +51,11 @@ struct Forecast {
     yaw_rad: f64,
 }
 
+/// Heights above the ground and distance from a known box at which a return of no cluster may be
+/// the object's.
+const STRAY_LOW_M: f64 = 0.25;
+const STRAY_ABOVE_M: f64 = 0.3;
+const STRAY_M: f64 = 0.4;
 /// Group number of spots that belong to no group.
 const NOBODY: u32 = u32::MAX;
 /// Around the box of a track its returns may lie this far out, and farther where it is unsure.
@@ -128,6 +133,7 @@ impl ObjectTracker {
         );
         self.predict(scene, end);
         self.divide(parameters, scene.scan);
+        self.add_strays(clusters, scene);
         self.gather(scene);
         self.join_pieces(scene);
         let pairs = self.pair(parameters);
@@ -225,6 +231,49 @@ impl ObjectTracker {
             }
         }
         self.align_seam(scan);
+    }
+
+    /// Adds returns of no cluster to the known objects in whose places they lie: far away too few
+    /// meet a cyclist to be a cluster.
+    fn add_strays(&mut self, clusters: &Clusters, scene: &Scene<'_>) {
+        let Scene { scan, sweep, .. } = *scene;
+        let placement = sweep.sensor.placement();
+        let columns = scan.columns() as f64;
+        for (number, track) in self.tracks.iter().enumerate() {
+            if !track.is_confirmed() || !track.is_sparse() {
+                continue;
+            }
+            let place = track.rectangle();
+            let corners = place.corners().map(|corner| placement.sensor_m(corner));
+            let Some((first, count)) = scan.columns_across(&corners) else {
+                continue;
+            };
+            let heights_m = STRAY_LOW_M..track.height_m() + STRAY_ABOVE_M;
+            for column in (first..first + count).map(|column| column % scan.columns()) {
+                let placement = sweep.pose((column as f64 + 1.0) / columns).placement();
+                for layer in 0..MAX_LAYERS {
+                    let point = scan.index(column, layer);
+                    let above_m = f64::from(scene.heights_m[point]);
+                    if clusters.labels()[point] != Clusters::NONE
+                        || !scan.has_return(point)
+                        || !heights_m.contains(&above_m)
+                    {
+                        continue;
+                    }
+                    let [x, y, _] = scan.point_m(point).map(f64::from);
+                    let at_m = placement.local_m([x, y]);
+                    if place.distance_m(at_m) < STRAY_M {
+                        self.spots.push(Spot {
+                            at_m: Vector2::from(at_m),
+                            above_m,
+                            age_s: scan.age_s(column),
+                            point: point as u32,
+                            group: number as u32,
+                        });
+                    }
+                }
+            }
+        }
     }
 
     /// What moves is seen twice at the seam of the sweep, a revolution apart: brings the older

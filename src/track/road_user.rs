@@ -36,6 +36,9 @@ const THERE_M: f64 = 2.0;
 /// Returns from which on a place tells a motion.
 const FEWEST_TO_MOVE: usize = 4;
 
+/// Returns below which an object may be no cluster in the next revolution.
+const SPARSE: usize = 16;
+
 /// Speeds from which an object counts as moving.
 const MOVING_MPS: f64 = 0.6;
 const FAST_MPS: f64 = 1.5;
@@ -171,6 +174,11 @@ impl Track {
 
     pub(super) fn is_confirmed(&self) -> bool {
         self.sightings >= 3
+    }
+
+    /// Whether it returns so little that it may be no cluster.
+    pub(super) fn is_sparse(&self) -> bool {
+        self.points < SPARSE
     }
 
     pub(super) fn odds(&self) -> f64 {
