@@ -1,10 +1,11 @@
 //! Kreisel takes each revolution of a Velodyne VLP-16 from an OpenDaVINCI or OpenDLV
-//! session and answers it with a list of the objects around the vehicle.
+//! session and answers it with a list of the road users around the vehicle.
 //!
 //! A revolution walks through the house once, front to back:
 //!
 //! ```text
 //! datagram -> wire -> cloud -> ground -> cluster -> track -> wire -> datagram
+//!                \-> ego ----------------------/
 //! ```
 //!
 //! Everything but the shell is pure: no I/O, no clock, no thread, no global state. The same
