@@ -186,6 +186,11 @@ impl Scan {
         }
     }
 
+    /// Horizontal distance of a point from the sensor; 0 or less where nothing came back.
+    pub fn distance_m(&self, point: usize) -> f32 {
+        self.range_m[point] * self.slopes[self.layer(point)].1 as f32
+    }
+
     /// Tangent and cosine of a layer's elevation.
     pub fn slope(&self, layer: usize) -> (f64, f64) {
         self.slopes[layer]

@@ -131,6 +131,17 @@ impl Sweep {
         let knot = (position as usize).min(KNOTS - 2);
         self.knots[knot].toward(&self.knots[knot + 1], position - knot as f64)
     }
+
+    /// How the points of each of a sweep's columns are placed, linear between the knots.
+    pub fn placements(&self, columns: usize, placements: &mut Vec<Placement>) {
+        let knots = self.knots.map(|knot| knot.placement());
+        placements.clear();
+        placements.extend((1..=columns).map(|column| {
+            let position = (KNOTS - 1) as f64 * column as f64 / columns as f64;
+            let knot = (position as usize).min(KNOTS - 2);
+            knots[knot].toward(&knots[knot + 1], position - knot as f64)
+        }));
+    }
 }
 
 /// The ego step: hears poses, tells where the sensor was.

@@ -70,6 +70,16 @@ pub struct Placement {
 }
 
 impl Placement {
+    /// What lies at a share of the way to another one that is hardly turned against it.
+    pub(super) fn toward(&self, other: &Self, share: f64) -> Self {
+        let between = |from: f64, to: f64| from + share * (to - from);
+        Self {
+            origin_m: [0, 1].map(|axis| between(self.origin_m[axis], other.origin_m[axis])),
+            sine: between(self.sine, other.sine),
+            cosine: between(self.cosine, other.cosine),
+        }
+    }
+
     /// From the sensor frame (x right, y forward) to the local frame.
     pub fn local_m(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [

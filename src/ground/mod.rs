@@ -263,10 +263,14 @@ impl Ground {
         self.heights_m
             .extend((0..scan.len()).map(|point| height_m(x_m[point], y_m[point], z_m[point])));
         if self.parameters.model == Model::Surface {
-            self.surface.find(scan, plane, vehicles);
-            for point in (0..scan.len()).filter(|point| range_m[*point] > 0.0) {
-                let distance_m = (x_m[point] * x_m[point] + y_m[point] * y_m[point]).sqrt();
-                self.heights_m[point] -= self.surface.level_m(scan.column(point), distance_m);
+            self.surface.find(scan, &self.heights_m, vehicles);
+            for column in 0..scan.columns() {
+                let profile = self.surface.profile(column);
+                for point in (0..MAX_LAYERS).map(|layer| scan.index(column, layer)) {
+                    if range_m[point] > 0.0 {
+                        self.heights_m[point] -= profile.level_m(scan.distance_m(point));
+                    }
+                }
             }
         }
         self.mask.clear();
@@ -308,7 +312,6 @@ impl Ground {
     /// below one that rises steeply from there and is no ground. Feet of people, tyres, bumpers
     /// and the foot of a wall lie as near to the ground as its own bumps do.
     fn spare_feet(&mut self, scan: &Scan) {
-        let (x_m, y_m) = (scan.x_m(), scan.y_m());
         for column in 0..scan.columns() {
             let mut above: Option<(f32, f32)> = None;
             for layer in (0..MAX_LAYERS).rev() {
@@ -316,7 +319,7 @@ impl Ground {
                 if !scan.has_return(point) {
                     continue;
                 }
-                let distance_m = (x_m[point] * x_m[point] + y_m[point] * y_m[point]).sqrt();
+                let distance_m = scan.distance_m(point);
                 let height_m = self.heights_m[point];
                 let least_m = FOOT_M + FOOT_PER_M * distance_m;
                 let stands = above.is_some_and(|(upper_m, upper_distance_m)| {

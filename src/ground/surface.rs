@@ -6,7 +6,6 @@
 //! plane below the vehicle, and neighbouring sectors vote, so that the side of a car, which
 //! fills a sector or two, is not taken for a rise.
 
-use super::Plane;
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::track::Rectangle;
 
@@ -19,7 +18,9 @@ pub(super) struct Surface {
     voted: Vec<[Ring; MAX_LAYERS]>,
     /// Sector of every column.
     sector_of: Vec<u16>,
-    /// Heights and distances of the returns of one layer in one sector.
+    profiles: Vec<Profile>,
+    /// Heights and distances of the returns of each layer in one sector.
+    levels: [Vec<(f32, f32)>; MAX_LAYERS],
     candidates: Vec<(f32, f32)>,
     /// Vehicles in the sector that is looked at.
     vehicles: Vec<Rectangle>,
@@ -46,6 +47,12 @@ const STEEPEST: f32 = 0.15;
 const BEND: f32 = 0.012;
 const BEND_PER_M: f32 = 0.0035;
 const MOST_BEND: f32 = 0.05;
+/// No ground is higher than this above the steepest slope.
+const HIGHEST_M: f32 = 0.5;
+/// A rise from one return to the next above that no road has.
+const STEEP: f32 = 1.0;
+/// Rings closer to each other say nothing of a slope.
+const SHORTEST_RUN_M: f32 = 0.1;
 /// How far a level may be off besides.
 const SLACK_M: f32 = 0.06;
 /// Levels this near to the plane are always possible, kerbs among them; farther ones as far
@@ -68,13 +75,15 @@ impl Surface {
             rings: vec![[Ring::default(); MAX_LAYERS]; sectors],
             voted: vec![[Ring::default(); MAX_LAYERS]; sectors],
             sector_of: vec![],
+            profiles: vec![Profile::FLAT; sectors],
+            levels: Default::default(),
             candidates: vec![],
             vehicles: vec![],
         }
     }
 
-    /// Follows the ground of a revolution.
-    pub(super) fn find(&mut self, scan: &Scan, plane: &Plane, vehicles: &[Rectangle]) {
+    /// Follows the ground of a revolution, given the heights of its points above the plane.
+    pub(super) fn find(&mut self, scan: &Scan, heights_m: &[f32], vehicles: &[Rectangle]) {
         self.sector_of.clear();
         let sectors = self.sectors;
         self.sector_of.extend((0..scan.columns()).map(|column| {
@@ -93,7 +102,7 @@ impl Surface {
                 .take_while(|other| **other == sector)
                 .count();
             self.look_out(scan.azimuth_rad(first + count / 2), vehicles);
-            self.measure_sector(scan, plane, first..first + count, sector as usize);
+            self.measure_sector(scan, heights_m, first..first + count, sector as usize);
             first += count;
         }
         for rings in &mut self.rings {
@@ -101,6 +110,9 @@ impl Surface {
         }
         self.reject_loners();
         self.vote();
+        for (profile, rings) in self.profiles.iter_mut().zip(&self.voted) {
+            *profile = Profile::through(rings);
+        }
     }
 
     /// Forgets levels that are far off where the ground is flat all around: what stands on a
@@ -147,39 +159,41 @@ impl Surface {
     fn measure_sector(
         &mut self,
         scan: &Scan,
-        plane: &Plane,
+        heights_m: &[f32],
         columns: std::ops::Range<usize>,
         sector: usize,
     ) {
-        let above_m = plane.heights();
-        for layer in 0..MAX_LAYERS {
-            self.candidates.clear();
-            for column in columns.clone() {
+        for levels in &mut self.levels {
+            levels.clear();
+        }
+        for column in columns {
+            // Height and distance of the next return above.
+            let mut above: Option<(f32, f32)> = None;
+            for layer in (0..MAX_LAYERS).rev() {
                 let point = scan.index(column, layer);
-                if scan.has_return(point) {
-                    let [x, y, z] = scan.point_m(point);
-                    let distance_m = (x * x + y * y).sqrt();
-                    let place_m = [f64::from(x), f64::from(y)];
-                    let is_taken = self
-                        .vehicles
-                        .iter()
-                        .any(|vehicle| vehicle.distance_m(place_m) < AROUND_VEHICLES_M);
-                    if distance_m < FARTHEST_M
-                        && !is_taken
-                        && !is_steep(scan, column, layer, distance_m, z)
-                    {
-                        self.candidates.push((above_m(x, y, z), distance_m));
-                    }
+                if !scan.has_return(point) {
+                    continue;
+                }
+                let (level_m, distance_m) = (heights_m[point], scan.distance_m(point));
+                let rises_steeply = above.is_some_and(|(upper_m, upper_distance_m)| {
+                    upper_m - level_m > STEEP * (upper_distance_m - distance_m)
+                });
+                above = Some((level_m, distance_m));
+                let can_be_ground = !rises_steeply
+                    && distance_m < FARTHEST_M
+                    && level_m < HIGHEST_M + STEEPEST * distance_m;
+                if can_be_ground && !self.is_taken(scan.point_m(point)) {
+                    self.levels[layer].push((level_m, distance_m));
                 }
             }
-            if self.candidates.len() < FEWEST {
+        }
+        for (levels, ring) in self.levels.iter_mut().zip(&mut self.rings[sector]) {
+            if levels.len() < FEWEST {
                 continue;
             }
-            let low = (self.candidates.len() as f32 * BELOW) as usize;
+            let low = (levels.len() as f32 * BELOW) as usize;
             let by_height = |a: &(f32, f32), b: &(f32, f32)| a.0.total_cmp(&b.0);
-            let (_, (level_m, distance_m), _) =
-                self.candidates.select_nth_unstable_by(low, by_height);
-            let ring = &mut self.rings[sector][layer];
+            let (_, (level_m, distance_m), _) = levels.select_nth_unstable_by(low, by_height);
             // A sweep that overlaps itself comes here twice.
             if ring.distance_m == 0.0 || *level_m < ring.level_m {
                 *ring = Ring {
@@ -188,6 +202,13 @@ impl Surface {
                 };
             }
         }
+    }
+
+    /// Whether a vehicle of the sector stands there.
+    fn is_taken(&self, [x, y, _]: [f32; 3]) -> bool {
+        let place_m = [f64::from(x), f64::from(y)];
+        let mut vehicles = self.vehicles.iter();
+        vehicles.any(|vehicle| vehicle.distance_m(place_m) < AROUND_VEHICLES_M)
     }
 
     /// The median of neighbouring sectors' levels, layer by layer.
@@ -224,37 +245,70 @@ impl Surface {
         }
     }
 
-    /// How high the ground is above the plane, `distance_m` away in a column.
-    pub(super) fn level_m(&self, column: usize, distance_m: f32) -> f32 {
-        let rings = &self.voted[self.sector_of[column] as usize];
-        let (mut inner, mut before) = (Ring::default(), Ring::default());
-        for ring in rings.iter().filter(|ring| ring.distance_m > 0.0) {
-            if ring.distance_m >= distance_m {
-                let share = (distance_m - inner.distance_m) / (ring.distance_m - inner.distance_m);
-                return inner.level_m + share * (ring.level_m - inner.level_m);
-            }
-            if ring.distance_m > inner.distance_m {
-                (before, inner) = (inner, *ring);
-            }
-        }
-        // Beyond the last ring it goes on as it came there, for as far as that was.
-        let run_m = inner.distance_m - before.distance_m;
-        if run_m <= 0.1 {
-            return inner.level_m;
-        }
-        let slope = ((inner.level_m - before.level_m) / run_m).clamp(-STEEPEST, STEEPEST);
-        inner.level_m + slope * (distance_m - inner.distance_m).min(run_m)
+    /// How high the ground is above the plane in a column.
+    pub(super) fn profile(&self, column: usize) -> &Profile {
+        &self.profiles[self.sector_of[column] as usize]
     }
 }
 
-/// Whether the next return above rises steeply from here, as from the foot of a wall.
-fn is_steep(scan: &Scan, column: usize, layer: usize, distance_m: f32, z_m: f32) -> bool {
-    let above = (layer + 1..MAX_LAYERS).map(|layer| scan.index(column, layer));
-    let next = above.into_iter().find(|point| scan.has_return(*point));
-    next.is_some_and(|point| {
-        let [x, y, z] = scan.point_m(point);
-        z - z_m > (x * x + y * y).sqrt() - distance_m
-    })
+/// Heights above the plane along a direction: straight between knots.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Profile {
+    count: usize,
+    distance_m: [f32; Self::MOST],
+    level_m: [f32; Self::MOST],
+    /// Behind each knot.
+    slope: [f32; Self::MOST],
+}
+
+impl Profile {
+    /// Every layer's ring, the sensor, and the end of what the last one says.
+    const MOST: usize = MAX_LAYERS + 2;
+
+    const FLAT: Self = Self {
+        count: 1,
+        distance_m: [0.0; Self::MOST],
+        level_m: [0.0; Self::MOST],
+        slope: [0.0; Self::MOST],
+    };
+
+    fn through(rings: &[Ring; MAX_LAYERS]) -> Self {
+        let mut profile = Self::FLAT;
+        let mut run_m = 0.0;
+        for ring in rings {
+            let last = profile.count - 1;
+            if ring.distance_m > profile.distance_m[last] {
+                run_m = ring.distance_m - profile.distance_m[last];
+                profile.slope[last] = (ring.level_m - profile.level_m[last]) / run_m;
+                profile.push(ring.distance_m, ring.level_m);
+            }
+        }
+        // Beyond the last ring it goes on as it came there, for as far as that was.
+        let last = profile.count - 1;
+        if last > 0 && run_m > SHORTEST_RUN_M {
+            let slope = profile.slope[last - 1].clamp(-STEEPEST, STEEPEST);
+            profile.slope[last] = slope;
+            let (distance_m, level_m) = (profile.distance_m[last], profile.level_m[last]);
+            profile.push(distance_m + run_m, level_m + slope * run_m);
+        }
+        profile
+    }
+
+    fn push(&mut self, distance_m: f32, level_m: f32) {
+        self.distance_m[self.count] = distance_m;
+        self.level_m[self.count] = level_m;
+        self.slope[self.count] = 0.0;
+        self.count += 1;
+    }
+
+    /// Above the plane, `distance_m` away.
+    pub(super) fn level_m(&self, distance_m: f32) -> f32 {
+        let behind = self.distance_m[1..self.count]
+            .iter()
+            .take_while(|knot_m| **knot_m <= distance_m)
+            .count();
+        self.level_m[behind] + self.slope[behind] * (distance_m - self.distance_m[behind])
+    }
 }
 
 /// Keeps the rings that can be one ground, from the inside out, and forgets the others.
@@ -319,10 +373,11 @@ mod tests {
     fn a_rise_is_followed_and_a_car_on_it_is_not() {
         let scan = rising_road(0.06);
         let mut surface = Surface::new(72);
-        surface.find(&scan, &Plane::level(1.8), &[]);
+        let heights_m: Vec<f32> = scan.z_m().iter().map(|z| z + 1.8).collect();
+        surface.find(&scan, &heights_m, &[]);
         for column in [10, 400, 1200] {
-            assert!(surface.level_m(column, 8.0).abs() < 0.1);
-            let level_m = surface.level_m(column, 20.0);
+            assert!(surface.profile(column).level_m(8.0).abs() < 0.1);
+            let level_m = surface.profile(column).level_m(20.0);
             assert!((level_m - 0.6).abs() < 0.15, "{column}: {level_m}");
         }
     }

@@ -238,7 +238,6 @@ impl ObjectTracker {
     fn add_strays(&mut self, clusters: &Clusters, scene: &Scene<'_>) {
         let Scene { scan, sweep, .. } = *scene;
         let placement = sweep.sensor.placement();
-        let columns = scan.columns() as f64;
         for (number, track) in self.tracks.iter().enumerate() {
             if !track.is_confirmed() || !track.is_sparse() {
                 continue;
@@ -250,7 +249,6 @@ impl ObjectTracker {
             };
             let heights_m = STRAY_LOW_M..track.height_m() + STRAY_ABOVE_M;
             for column in (first..first + count).map(|column| column % scan.columns()) {
-                let placement = sweep.pose((column as f64 + 1.0) / columns).placement();
                 for layer in 0..MAX_LAYERS {
                     let point = scan.index(column, layer);
                     let above_m = f64::from(scene.heights_m[point]);
@@ -261,7 +259,7 @@ impl ObjectTracker {
                         continue;
                     }
                     let [x, y, _] = scan.point_m(point).map(f64::from);
-                    let at_m = placement.local_m([x, y]);
+                    let at_m = self.placer.placements()[column].local_m([x, y]);
                     if place.distance_m(at_m) < STRAY_M {
                         self.spots.push(Spot {
                             at_m: Vector2::from(at_m),

@@ -5,6 +5,7 @@ use nalgebra::Vector2;
 use super::{Scene, TrackParameters};
 use crate::cloud::Scan;
 use crate::cluster::Clusters;
+use crate::ego::Placement;
 
 /// One return.
 #[derive(Debug, Clone, Copy)]
@@ -59,6 +60,7 @@ pub(super) struct Placer {
     /// For each cell its first entry, and the part that it belongs to.
     parts: Vec<(usize, usize)>,
     parted: Vec<(usize, Spot)>,
+    placements: Vec<Placement>,
 }
 
 /// Side of the cells of which a part consists: surfaces of one body are closer to each other,
@@ -80,6 +82,11 @@ const GOES_ON: f64 = 0.5;
 const SMALLEST_DIVIDED_M: f64 = 1.0;
 
 impl Placer {
+    /// How the points of each column of the last revolution were placed.
+    pub(super) fn placements(&self) -> &[Placement] {
+        &self.placements
+    }
+
     /// Places the points of every cluster with the sensor's pose at the time of their column,
     /// and divides every cluster into parts that touch each other, seen from above. DBSCAN's
     /// distance must bridge two layers; seen from above there are no layers.
@@ -94,21 +101,15 @@ impl Placer {
         let Scene { scan, sweep, .. } = *scene;
         spots.clear();
         patches.clear();
-        let columns = scan.columns() as f64;
+        sweep.placements(scan.columns(), &mut self.placements);
         for points in clusters.iter() {
             let begin = spots.len();
-            let mut last_column = usize::MAX;
-            let mut placement = sweep.sensor.placement();
             for point in points {
                 let number = *point as usize;
                 let column = scan.column(number);
-                if column != last_column {
-                    placement = sweep.pose((column as f64 + 1.0) / columns).placement();
-                    last_column = column;
-                }
                 let [x, y, _] = scan.point_m(number).map(f64::from);
                 spots.push(Spot {
-                    at_m: Vector2::from(placement.local_m([x, y])),
+                    at_m: Vector2::from(self.placements[column].local_m([x, y])),
                     above_m: f64::from(scene.heights_m[number]),
                     age_s: scan.age_s(column),
                     point: *point,
