@@ -294,13 +294,14 @@ impl Ground {
         let Some((first, count)) = scan.columns_across(&vehicle.corners()) else {
             return;
         };
+        let outline = vehicle.outline();
         for column in (first..first + count).map(|column| column % scan.columns()) {
             for layer in 0..MAX_LAYERS {
                 let point = scan.index(column, layer);
                 let [x, y, _] = scan.point_m(point).map(f64::from);
                 if self.mask[point]
                     && self.heights_m[point] > BUMPER_M
-                    && vehicle.distance_m([x, y]) < 0.0
+                    && outline.distance_m([x, y]) < 0.0
                 {
                     self.mask[point] = false;
                 }

@@ -7,7 +7,7 @@
 //! fills a sector or two, is not taken for a rise.
 
 use crate::cloud::{MAX_LAYERS, Scan};
-use crate::track::Rectangle;
+use crate::track::{Outline, Rectangle};
 
 /// Heights of the ground relative to the plane.
 #[derive(Debug, Clone)]
@@ -23,7 +23,7 @@ pub(super) struct Surface {
     levels: [Vec<(f32, f32)>; MAX_LAYERS],
     candidates: Vec<(f32, f32)>,
     /// Vehicles in the sector that is looked at.
-    vehicles: Vec<Rectangle>,
+    vehicles: Vec<Outline>,
 }
 
 /// Where a layer meets the ground in a sector.
@@ -152,7 +152,7 @@ impl Surface {
         };
         self.vehicles.clear();
         self.vehicles
-            .extend(vehicles.iter().filter(may_meet).copied());
+            .extend(vehicles.iter().filter(may_meet).map(Rectangle::outline));
     }
 
     /// The low level of each layer in the columns of a sector.

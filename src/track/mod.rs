@@ -27,7 +27,7 @@ mod spots;
 mod trail;
 
 pub use class::Class;
-pub use rectangle::Rectangle;
+pub use rectangle::{Outline, Rectangle};
 
 use crate::cloud::Scan;
 use crate::cluster::Clusters;

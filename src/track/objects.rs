@@ -9,7 +9,7 @@ use super::road_user::Track;
 use super::shape::Look;
 use super::sight::Sight;
 use super::spots::{Patch, Placer, Spot};
-use super::{Object, Rectangle, Scene, TrackParameters};
+use super::{Object, Outline, Rectangle, Scene, TrackParameters};
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::cluster::Clusters;
 use crate::ego::{Pose, wrapped_rad};
@@ -45,6 +45,7 @@ struct Group {
 /// Where a track is expected.
 struct Forecast {
     rectangle: Rectangle,
+    outline: Outline,
     reach_m: f64,
     margin_m: f64,
     most_m: [f64; 2],
@@ -163,6 +164,7 @@ impl ObjectTracker {
             let reach_m = 0.5 * libm::hypot(rectangle.length_m, rectangle.width_m) + margin_m;
             Forecast {
                 rectangle,
+                outline: rectangle.outline(),
                 reach_m,
                 margin_m,
                 most_m: track.most_m(),
@@ -197,7 +199,7 @@ impl ObjectTracker {
                     .iter()
                     .map(|track| {
                         (
-                            forecasts[*track].rectangle.distance_m(spot.at_m.into()),
+                            forecasts[*track].outline.distance_m(spot.at_m.into()),
                             *track,
                         )
                     })
@@ -243,6 +245,7 @@ impl ObjectTracker {
                 continue;
             }
             let place = track.rectangle();
+            let outline = place.outline();
             let corners = place.corners().map(|corner| placement.sensor_m(corner));
             let Some((first, count)) = scan.columns_across(&corners) else {
                 continue;
@@ -260,7 +263,7 @@ impl ObjectTracker {
                     }
                     let [x, y, _] = scan.point_m(point).map(f64::from);
                     let at_m = self.placer.placements()[column].local_m([x, y]);
-                    if place.distance_m(at_m) < STRAY_M {
+                    if outline.distance_m(at_m) < STRAY_M {
                         self.spots.push(Spot {
                             at_m: Vector2::from(at_m),
                             above_m,
@@ -409,12 +412,12 @@ impl ObjectTracker {
         let (rows, columns) = (self.tracks.len(), self.groups.len());
         let mut cost = vec![f64::MAX; rows * columns];
         for (row, track) in self.tracks.iter().enumerate() {
-            let rectangle = track.rectangle();
+            let outline = track.rectangle().outline();
             let leap_m =
                 FARTHEST_LEAP_M.min(parameters.association_distance_m + 2.0 * track.spread_m());
             for (column, group) in self.groups.iter().enumerate() {
                 let is_claimed = group.claimed_by == Some(row);
-                let apart_m = rectangle.distance_m(group.look.middle_m.into());
+                let apart_m = outline.distance_m(group.look.middle_m.into());
                 if apart_m > leap_m && !is_claimed {
                     continue;
                 }
@@ -458,7 +461,11 @@ impl ObjectTracker {
         end: Time,
         parameters: &TrackParameters,
     ) {
-        let known: Vec<Rectangle> = self.tracks.iter().map(Track::rectangle).collect();
+        let known: Vec<Outline> = self
+            .tracks
+            .iter()
+            .map(|track| track.rectangle().outline())
+            .collect();
         for (number, group) in self.groups.iter().enumerate() {
             if pairs.contains(&Some(number)) || !group.may_be_new {
                 continue;
@@ -507,7 +514,7 @@ impl ObjectTracker {
                 let within_m = -0.3 * place.width_m.min(1.6);
                 let is_better =
                     (*odds, std::cmp::Reverse(other)) > (track.odds(), std::cmp::Reverse(own));
-                other != own && is_better && place.distance_m(centre_m) < within_m
+                other != own && is_better && place.outline().distance_m(centre_m) < within_m
             });
             !doubled
         });

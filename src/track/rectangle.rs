@@ -18,7 +18,7 @@ pub struct Rectangle {
 /// Directions that are tried within a quarter turn.
 const DIRECTIONS: usize = 30;
 /// Points that are looked at for the direction: more do not change it.
-const MOST_POINTS: usize = 256;
+const MOST_POINTS: usize = 96;
 /// Distance to an edge below which a point counts as on it.
 const NEAREST_M: f64 = 0.05;
 
@@ -83,14 +83,35 @@ impl Rectangle {
             .map(|(u, v)| [x + u * cosine - v * sine, y + u * sine + v * cosine])
     }
 
-    /// Distance of a place from the rectangle's edge, negative within.
-    pub fn distance_m(&self, [x, y]: [f64; 2]) -> f64 {
+    /// The same, ready to measure many distances.
+    pub fn outline(&self) -> Outline {
         let (sine, cosine) = libm::sincos(self.yaw_rad);
+        Outline {
+            centre_m: self.centre_m,
+            half_m: [0.5 * self.length_m, 0.5 * self.width_m],
+            sine,
+            cosine,
+        }
+    }
+}
+
+/// A rectangle from which distances are measured.
+#[derive(Debug, Clone, Copy)]
+pub struct Outline {
+    centre_m: [f64; 2],
+    half_m: [f64; 2],
+    sine: f64,
+    cosine: f64,
+}
+
+impl Outline {
+    /// Distance of a place from the edge, negative within.
+    pub fn distance_m(&self, [x, y]: [f64; 2]) -> f64 {
         let offset = [x - self.centre_m[0], y - self.centre_m[1]];
-        let [along_m, across_m] = turned(&offset, sine, cosine);
+        let [along_m, across_m] = turned(&offset, self.sine, self.cosine);
         let out = [
-            libm::fabs(along_m) - 0.5 * self.length_m,
-            libm::fabs(across_m) - 0.5 * self.width_m,
+            along_m.abs() - self.half_m[0],
+            across_m.abs() - self.half_m[1],
         ];
         if out[0] > 0.0 && out[1] > 0.0 {
             libm::hypot(out[0], out[1])
@@ -181,9 +202,9 @@ mod tests {
             length_m: 4.0,
             width_m: 2.0,
         };
-        assert!((rectangle.distance_m([10.0, 0.0]) + 1.0).abs() < 1e-9);
-        assert!((rectangle.distance_m([10.0, 3.0]) - 1.0).abs() < 1e-9);
-        assert!((rectangle.distance_m([14.0, 6.0]) - 5.0).abs() < 1e-9);
+        assert!((rectangle.outline().distance_m([10.0, 0.0]) + 1.0).abs() < 1e-9);
+        assert!((rectangle.outline().distance_m([10.0, 3.0]) - 1.0).abs() < 1e-9);
+        assert!((rectangle.outline().distance_m([14.0, 6.0]) - 5.0).abs() < 1e-9);
         let [x, y] = rectangle.corners()[0];
         assert!((x - 9.0).abs() < 1e-9 && (y - 2.0).abs() < 1e-9);
     }

@@ -237,7 +237,12 @@ impl Placer {
     }
 
     fn cell_of(&self, spot: &Spot) -> [i32; 2] {
-        [spot.at_m.x, spot.at_m.y].map(|metres| libm::floor(metres / self.cell_m) as i32)
+        let cell = |metres: f64| {
+            let cells = metres / self.cell_m;
+            let toward_0 = cells as i32;
+            toward_0 - i32::from(f64::from(toward_0) > cells)
+        };
+        [cell(spot.at_m.x), cell(spot.at_m.y)]
     }
 
     /// Marks the cells above which there is more, close to the cut.
