@@ -11,6 +11,7 @@ use super::{Completion, block_on, simulate, stop_signal};
 use crate::config::Configuration;
 use crate::daemon::session::Session;
 use crate::daemon::{self, Options};
+use crate::track::Class;
 use crate::wire::object_list::{Object, ObjectList};
 use crate::wire::{Envelope, Message};
 
@@ -90,11 +91,12 @@ async fn show_objects(session: Session) -> Result<()> {
 
 fn table(list: &ObjectList) -> String {
     let mut text = format!(
-        "revolution {}: {} objects in {:.2} ms\n{:>5} {:>7} {:>7} {:>6} {:>6} {:>14} {:>7}\n",
+        "revolution {}: {} objects in {:.2} ms\n{:>5} {:<12} {:>7} {:>7} {:>6} {:>6} {:>14} {:>7}\n",
         list.revolution,
         list.count,
         1000.0 * list.processing_time,
         "id",
+        "class",
         "x m",
         "y m",
         "m/s",
@@ -114,8 +116,9 @@ fn row(object: &Object) -> String {
         object.length, object.width, object.height
     );
     format!(
-        "{:>5} {:>7.1} {:>7.1} {:>6.1} {:>6.0} {:>14} {:>7}\n",
+        "{:>5} {:<12} {:>7.1} {:>7.1} {:>6.1} {:>6.0} {:>14} {:>7}\n",
         object.object_id,
+        Class::from_number(object.classification).map_or("?", Class::name),
         object.x,
         object.y,
         object.speed,

@@ -31,6 +31,20 @@ impl Class {
         }
     }
 
+    /// Every class, in the order of their numbers.
+    const ALL: [Self; 5] = [
+        Self::Unclassified,
+        Self::Car,
+        Self::Cyclist,
+        Self::Pedestrian,
+        Self::LargeVehicle,
+    ];
+
+    /// The class with a number on the wire.
+    pub fn from_number(number: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|class| class.number() == number)
+    }
+
     /// The word in files.
     pub const fn name(self) -> &'static str {
         match self {
