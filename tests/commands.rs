@@ -227,6 +227,25 @@ fn inspect_says_what_the_array_cannot_hold() {
 }
 
 #[test]
+fn process_compares_its_objects_with_truth() {
+    let folder = Folder::new();
+    let (recording, truth) = (folder.text("in.rec"), folder.text("truth.jsonl"));
+    let simulate = ["simulate", "roundabout", "--seed=3", "--duration=6"];
+    let files = ["--output", &recording, "--truth", &truth];
+    assert_eq!(code(&kreisel(&[&simulate[..], &files[..]].concat())), 0);
+    let compared = kreisel(&["process", &recording, "--truth", &truth]);
+    assert_eq!(code(&compared), 0, "{}", stderr(&compared));
+    let shown = String::from_utf8(compared.stdout).unwrap();
+    let found = shown
+        .split("returns or more, ")
+        .nth(1)
+        .and_then(|rest| rest.split(" %").next());
+    let found: f64 = found.unwrap().parse().unwrap();
+    assert!(shown.contains("truth of 60 revolutions"), "{shown}");
+    assert!((75.0..=100.0).contains(&found), "{shown}");
+}
+
+#[test]
 fn a_damaged_recording_is_processed_around_its_damage() {
     let folder = Folder::new();
     let recording = folder.text("in.rec");
@@ -280,7 +299,11 @@ fn what_is_wrong_is_one_line_that_names_it() {
     );
     let empty = folder.write("empty.rec", "");
     let noise = folder.write("noise.pcap", "this is no capture at all");
-    let cases: [(&[&str], &str); 6] = [
+    let cases: [(&[&str], &str); 7] = [
+        (
+            &["process", &empty, "--truth", &noise],
+            "noise.pcap: no truth in the line at byte 0",
+        ),
         (
             &["process", "/no/such.rec"],
             "kreisel: /no/such.rec: No such file",

@@ -40,6 +40,8 @@ mod replay;
 
 mod run;
 
+mod score;
+
 mod simulate;
 
 use std::net::Ipv4Addr;

@@ -7,6 +7,7 @@ use clap::Args;
 
 use super::files::Output;
 use super::labels::LabelWriter;
+use super::score::Score;
 use super::{Completion, files, objects};
 use crate::pipeline::{Fault, Outcome, Pipeline, RevolutionReport};
 use crate::tally::Tally;
@@ -29,6 +30,9 @@ pub(super) struct Arguments {
     /// Labels of all points, one array a revolution.
     #[arg(long, value_name = "OUT.npz")]
     labels: Option<PathBuf>,
+    /// Truth to compare the objects with, as `kreisel simulate` writes it.
+    #[arg(long, value_name = "FILE.jsonl")]
+    truth: Option<PathBuf>,
     /// Configuration file; `kreisel config` prints one.
     #[arg(long, value_name = "FILE.toml")]
     config: Option<PathBuf>,
@@ -46,6 +50,7 @@ struct Process<'a> {
     output: Option<Output>,
     objects: Option<Output>,
     labels: Option<LabelWriter>,
+    score: Option<Score>,
     frame: Vec<u8>,
     status_due: Option<Time>,
     faults: Tally,
@@ -56,8 +61,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let bytes = files::read(&arguments.input)?;
     let outputs = [&arguments.output, &arguments.objects, &arguments.labels];
     files::check_distinct(&arguments.input, &outputs.map(Option::as_ref))?;
+    if let Some(truth) = &arguments.truth {
+        files::check_distinct(truth, &outputs.map(Option::as_ref))?;
+    }
     let mut process = Process {
         arguments,
+        score: arguments.truth.as_deref().map(Score::read).transpose()?,
         pipeline: Pipeline::new(&configuration, arguments.id),
         output: Output::create_if(arguments.output.as_deref())?,
         objects: Output::create_if(arguments.objects.as_deref())?,
@@ -123,6 +132,9 @@ impl Process<'_> {
         if let Some(output) = &mut self.objects {
             output.put(&objects::line(report, self.pipeline.objects())?)?;
         }
+        if let Some(score) = &mut self.score {
+            score.take(report, self.pipeline.objects());
+        }
         if let Some(labels) = &mut self.labels {
             labels.put_perceived(&self.pipeline, report.number)?;
         }
@@ -166,6 +178,9 @@ impl Process<'_> {
             status.revolutions_refused,
             status.datagrams_damaged,
         );
+        if let Some(score) = &self.score {
+            say!("{}", score.summary());
+        }
         if self.faults.total() > 0 {
             tell!(
                 "kreisel: {}: {}",
