@@ -67,6 +67,8 @@ const SPREAD: f32 = 2.0;
 const AROUND_VEHICLES_M: f64 = 0.6;
 /// Sectors to either side that vote on a level.
 const VOTERS: usize = 3;
+/// As many of them know a level that the sector itself cannot see.
+const FEWEST_VOTES: usize = 4;
 
 impl Surface {
     pub(super) fn new(sectors: usize) -> Self {
@@ -115,7 +117,7 @@ impl Surface {
         }
     }
 
-    /// Forgets levels that are far off where the ground is flat all around: what stands on a
+    /// Forgets levels that are far up where the ground is flat all around: what stands on a
     /// flat road is more likely than a hill in one place. A layer's median says how flat it is.
     fn reject_loners(&mut self) {
         let mut spread_m = 0.0f32;
@@ -134,7 +136,7 @@ impl Surface {
             }
             let most_m = FLAT_M + OFF * spread_m;
             for rings in &mut self.rings {
-                if rings[layer].level_m.abs() > most_m {
+                if rings[layer].level_m > most_m {
                     rings[layer] = Ring::default();
                 }
             }
@@ -231,7 +233,7 @@ impl Surface {
                         count += 1;
                     }
                 }
-                self.voted[sector][layer] = if count == 0 || own.distance_m == 0.0 {
+                self.voted[sector][layer] = if count < FEWEST_VOTES && own.distance_m == 0.0 {
                     Ring::default()
                 } else {
                     let levels = &mut levels[..count];
