@@ -423,36 +423,6 @@ impl Track {
 
     /// What is published, valid at `end`.
     pub(super) fn object(&self, end: Time) -> Object {
-        if std::env::var("DBGQ").is_ok() {
-            let q = self.qualities();
-            let h = |v: Option<f64>| v.unwrap_or(-1.0);
-            eprintln!(
-                "Q {} {:.0} {:.2} {:.2} {:.2} {:.2} {:.2} {:.2} {:.2} {:.3} {:.2} {} {} {:.1} {} {:.2} {:.2} {:.2} {}",
-                self.id,
-                10.0 * end.seconds(),
-                q.long_m,
-                q.short_m,
-                h(q.whole_m),
-                h(q.across_m),
-                h(q.upper_m),
-                q.top_m,
-                if q.top_below_m > 99.0 {
-                    99.0
-                } else {
-                    q.top_below_m
-                },
-                q.roughness_m,
-                q.speed_mps,
-                u8::from(q.moved),
-                u8::from(q.is_suspect),
-                q.range_m,
-                q.points,
-                self.goes_on,
-                self.odds,
-                self.belief.road_user(),
-                self.sightings
-            );
-        }
         let mut later = self.clone();
         later.predict(end);
         let estimate = later.motion.estimate();
