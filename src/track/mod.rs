@@ -1,12 +1,19 @@
 //! Step five: clusters become objects that keep their identity from revolution to revolution.
 //!
-//! `objects` takes a revolution in: `spots` places its returns, `assignment` says what is
-//! whose, `sight` what is hidden and what is gone. A `road_user` has a `motion`, a `shape`, a
-//! `class` and a `trail`. `nearest` is the tracking of the thesis.
+//! `objects` takes a revolution in: `spots` places its returns, `grouping` says which belong
+//! together, `assignment` what is whose, `sight` what is hidden and what is gone. A `road_user`
+//! learns from each `look` its `motion`, its `shape`, its `class`, and by its `trail` whether it
+//! moves; `existence` says whether it is there at all. `nearest` is the tracking of the thesis.
 
 mod assignment;
 
 mod class;
+
+mod existence;
+
+mod grouping;
+
+mod look;
 
 mod motion;
 

@@ -49,7 +49,7 @@ impl Rectangle {
 
     fn along(points_m: &[[f64; 2]], yaw_rad: f64) -> Self {
         let (sine, cosine) = libm::sincos(yaw_rad);
-        let extent = Extent::of(points_m.iter(), sine, cosine);
+        let extent = Extent::of(points_m.iter().copied(), sine, cosine);
         let [u, v] = extent.middle();
         Self {
             centre_m: [u * cosine - v * sine, u * sine + v * cosine],
@@ -125,7 +125,7 @@ impl Outline {
 fn closeness(points_m: &[[f64; 2]], stride: usize, yaw_rad: f64) -> f64 {
     let (sine, cosine) = libm::sincos(yaw_rad);
     let points = || points_m.iter().step_by(stride);
-    let extent = Extent::of(points(), sine, cosine);
+    let extent = Extent::of(points().copied(), sine, cosine);
     points()
         .map(|point| {
             let position = turned(point, sine, cosine);
@@ -138,20 +138,21 @@ fn closeness(points_m: &[[f64; 2]], stride: usize, yaw_rad: f64) -> f64 {
         .sum()
 }
 
+/// Least and greatest coordinates along and across a direction.
 #[derive(Debug, Clone, Copy)]
-struct Extent {
-    low: [f64; 2],
-    high: [f64; 2],
+pub(super) struct Extent {
+    pub(super) low: [f64; 2],
+    pub(super) high: [f64; 2],
 }
 
 impl Extent {
-    fn of<'a>(points_m: impl Iterator<Item = &'a [f64; 2]>, sine: f64, cosine: f64) -> Self {
+    pub(super) fn of(points_m: impl Iterator<Item = [f64; 2]>, sine: f64, cosine: f64) -> Self {
         let nothing = Self {
             low: [f64::MAX; 2],
             high: [f64::MIN; 2],
         };
         points_m.fold(nothing, |extent, point| {
-            let [u, v] = turned(point, sine, cosine);
+            let [u, v] = turned(&point, sine, cosine);
             Self {
                 low: [extent.low[0].min(u), extent.low[1].min(v)],
                 high: [extent.high[0].max(u), extent.high[1].max(v)],
@@ -165,7 +166,7 @@ impl Extent {
 }
 
 /// A point's coordinates along and across a direction.
-fn turned([x, y]: &[f64; 2], sine: f64, cosine: f64) -> [f64; 2] {
+pub(super) fn turned([x, y]: &[f64; 2], sine: f64, cosine: f64) -> [f64; 2] {
     [x * cosine + y * sine, y * cosine - x * sine]
 }
 

@@ -3,11 +3,13 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::class::{Belief, Qualities};
+use super::existence::Existence;
+use super::look::{Look, View};
 use super::motion::Motion;
-use super::shape::{Look, Shape, View, fitted_yaw};
+use super::shape::{Shape, fitted_yaw};
 use super::sight::Sight;
 use super::spots::Spot;
-use super::trail::Trail;
+use super::trail::Trails;
 use super::{Object, Rectangle, TrackParameters};
 use crate::time::{Span, Time};
 
@@ -16,25 +18,8 @@ const BIRTH_MPS: f64 = 6.0;
 /// Noise of a box's middle beside that of its edges, because its shape is not a box.
 const MIDDLE_M: f64 = 0.08;
 
-/// Logarithms of the odds that an object exists: at birth, gained by each sighting, and lost
-/// by a revolution that should have shown it, that cannot have shown it, or that shows nothing
-/// in its place.
-const BIRTH_ODDS: f64 = -0.6;
-const SEEN_ODDS: f64 = 1.0;
-const MISSED_ODDS: f64 = -0.9;
-const UNSEEN_ODDS: f64 = -0.5;
-const HIDDEN_ODDS: f64 = -0.08;
-const EMPTY_ODDS: f64 = -2.0;
-/// More certainty than this would make it slow to doubt.
-const MOST_ODDS: f64 = 5.0;
-/// Below this nothing is left of it.
-const LEAST_ODDS: f64 = -1.2;
-
 /// An object that is farther than this from where it is said to be is not there.
 const THERE_M: f64 = 2.0;
-
-/// Returns from which on a place tells a motion.
-const FEWEST_TO_MOVE: usize = 4;
 
 /// Returns below which an object may be no cluster in the next revolution.
 const SPARSE: usize = 16;
@@ -63,15 +48,11 @@ pub(super) struct Track {
     is_suspect: bool,
     /// Where it was first seen, since its frame is the same.
     born_m: Vector2<f64>,
-    /// Where its middle was measured lately, the latest last.
-    trail_m: Trail,
-    /// The same for its left and right ends, as far as they were seen.
-    end_trails_m: [Trail; 2],
-    odds: f64,
-    sightings: u32,
+    trails: Trails,
+    existence: Existence,
     points: usize,
     range_m: f64,
-    pub(super) is_hidden: bool,
+    is_hidden: bool,
     floor_z_m: f64,
 }
 
@@ -103,10 +84,8 @@ impl Track {
             travelled_m: 0.0,
             is_suspect,
             born_m: look.middle_m,
-            trail_m: Trail::default(),
-            end_trails_m: [Trail::default(); 2],
-            odds: BIRTH_ODDS,
-            sightings: 1,
+            trails: Trails::default(),
+            existence: Existence::new(),
             points: look.points,
             range_m: look.range_m,
             is_hidden: false,
@@ -115,7 +94,7 @@ impl Track {
         track.belief = Belief::of(&track.qualities());
         let view = look.view(spots, track.shape.yaw_rad);
         let (centre_m, noise) = track.centre(&view, look.middle_m);
-        track.trail_m.push(centre_m);
+        track.trails.begin(centre_m);
         track.born_m = centre_m;
         track.motion = Motion::new(centre_m, noise, BIRTH_MPS);
         track
@@ -173,7 +152,7 @@ impl Track {
     }
 
     pub(super) fn is_confirmed(&self) -> bool {
-        self.sightings >= 3
+        self.existence.is_confirmed()
     }
 
     /// Whether it returns so little that it may be no cluster.
@@ -182,7 +161,7 @@ impl Track {
     }
 
     pub(super) fn odds(&self) -> f64 {
-        self.odds
+        self.existence.odds()
     }
 
     /// Longest extent that more of the same object may have.
@@ -250,21 +229,9 @@ impl Track {
         self.keep_near_edges(look, before, after);
         let (centre_m, noise) = self.centre(&view, self.motion.estimate().position_m);
         self.motion.measure_position(centre_m, noise);
-        // The hidden end of a thing shows the motion of what hides it, and a few returns from far
-        // away come from another part of a thing each time.
-        if look.points >= FEWEST_TO_MOVE {
-            if look.is_cut == [false; 2] {
-                self.trail_m.push(centre_m);
-            }
-            for side in [0, 1] {
-                if !look.is_cut[side] {
-                    self.end_trails_m[side].push(look.ends_m[side]);
-                }
-            }
-        }
+        self.trails.push(centre_m, look);
         self.steer();
-        self.odds = (self.odds + SEEN_ODDS).min(MOST_ODDS);
-        self.sightings = self.sightings.saturating_add(1);
+        self.existence.see();
         self.last_measured = seen_at;
         self.is_hidden = false;
         self.points = look.points;
@@ -330,14 +297,7 @@ impl Track {
         let estimate = self.motion.estimate();
         let speed_mps = estimate.velocity_mps.norm();
         let is_moving = estimate.standing < 0.1 && speed_mps > MOVING_MPS;
-        let length_m = self.shape.seen_m[0];
-        let shows_motion = match look.is_cut {
-            [false, false] => self.trail_m.shows_motion(length_m),
-            [false, true] => self.end_trails_m[0].shows_motion(length_m),
-            [true, false] => self.end_trails_m[1].shows_motion(length_m),
-            [true, true] => false,
-        };
-        if is_moving && shows_motion {
+        if is_moving && self.trails.shows_motion(self.shape.seen_m[0], look) {
             self.moves = true;
             let travelled_m = (estimate.position_m - self.born_m).norm();
             self.travelled_m = self.travelled_m.max(travelled_m);
@@ -380,26 +340,14 @@ impl Track {
         if !self.moves {
             self.motion.halt();
         }
-        let young_s = 1.0 - (end - self.first_seen).seconds();
-        self.odds += if self.is_hidden {
-            if young_s > 0.0 {
-                MISSED_ODDS
-            } else {
-                HIDDEN_ODDS
-            }
-        } else if !sight.is_observable() {
-            UNSEEN_ODDS
-        } else if sight.is_empty() {
-            EMPTY_ODDS
-        } else {
-            MISSED_ODDS
-        };
+        let age_s = (end - self.first_seen).seconds();
+        self.existence.miss(sight, age_s);
     }
 
     /// Whether nothing is left of it.
     pub(super) fn is_gone(&self, parameters: &TrackParameters) -> bool {
         let unseen_s = (self.time - self.last_measured).seconds();
-        self.odds < LEAST_ODDS
+        self.existence.is_gone()
             || unseen_s > parameters.hidden_memory_s
             || (self.is_hidden && !self.is_confirmed())
     }
@@ -413,10 +361,7 @@ impl Track {
         let (sine, cosine) = libm::sincos(turn_rad);
         self.motion.reframe(sine, cosine, moved);
         self.shape.yaw_rad = crate::ego::wrapped_rad(self.shape.yaw_rad + turn_rad);
-        self.trail_m.reframe(moved);
-        for trail_m in &mut self.end_trails_m {
-            trail_m.reframe(moved);
-        }
+        self.trails.reframe(moved);
         self.born_m = Vector2::from(moved(self.born_m.into()));
         self.floor_z_m += rise_m;
     }
@@ -439,7 +384,6 @@ impl Track {
         // Of a normal distribution in the plane the share within a distance (Rayleigh).
         let variance = 0.5 * estimate.position_covariance.trace();
         let there = 1.0 - libm::exp(-0.5 * THERE_M * THERE_M / variance.max(1e-6));
-        let existence = 1.0 / (1.0 + libm::exp(-later.odds));
         let height_m = later.shape.top_m.max(0.1);
         let speed_variance = (ahead.transpose() * estimate.velocity_covariance * ahead)[0];
         Object {
@@ -462,7 +406,7 @@ impl Track {
                 .map(|axis| libm::sqrt(estimate.position_covariance[(axis, axis)])),
             yaw_deviation_rad: libm::sqrt(later.shape.yaw_variance),
             speed_deviation_mps: libm::sqrt(speed_variance),
-            existence: existence * later.belief.road_user() * there,
+            existence: self.existence.probability() * later.belief.road_user() * there,
             first_seen: self.first_seen,
             last_measured: self.last_measured,
             points: self.points,

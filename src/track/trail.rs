@@ -2,9 +2,11 @@
 
 use nalgebra::Vector2;
 
+use super::look::Look;
+
 /// The last places of something.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Trail {
+struct Trail {
     places_m: [Vector2<f64>; Trail::LONGEST],
     count: usize,
 }
@@ -12,7 +14,7 @@ pub(super) struct Trail {
 impl Trail {
     const LONGEST: usize = 10;
 
-    pub(super) fn push(&mut self, place_m: Vector2<f64>) {
+    fn push(&mut self, place_m: Vector2<f64>) {
         if self.count == Self::LONGEST {
             self.places_m.rotate_left(1);
             self.count -= 1;
@@ -21,14 +23,14 @@ impl Trail {
         self.count += 1;
     }
 
-    pub(super) fn reframe(&mut self, moved: impl Fn([f64; 2]) -> [f64; 2]) {
+    fn reframe(&mut self, moved: impl Fn([f64; 2]) -> [f64; 2]) {
         for place_m in &mut self.places_m[..self.count] {
             *place_m = Vector2::from(moved((*place_m).into()));
         }
     }
 
     /// Whether the places lie one after the other on a way, of something so long.
-    pub(super) fn shows_motion(&self, length_m: f64) -> bool {
+    fn shows_motion(&self, length_m: f64) -> bool {
         const FEWEST: usize = 4;
         /// Share of the way that is left from end to end.
         const STRAIGHT: f64 = 0.75;
@@ -46,6 +48,56 @@ impl Trail {
         places_m.len() >= FEWEST
             && net_m > LEAST_M + LEAST_PER_LENGTH * length_m
             && net_m > STRAIGHT * way_m
+    }
+}
+
+/// Returns from which on a place tells a motion.
+const FEWEST_RETURNS: usize = 4;
+
+/// The ways of a thing's middle and of its two ends, as far as they were seen.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Trails {
+    middle_m: Trail,
+    ends_m: [Trail; 2],
+}
+
+impl Trails {
+    /// The first place.
+    pub(super) fn begin(&mut self, middle_m: Vector2<f64>) {
+        self.middle_m.push(middle_m);
+    }
+
+    /// Goes on with a look. The hidden end of a thing shows the motion of what hides it, and a few
+    /// returns from far away come from another part of a thing each time.
+    pub(super) fn push(&mut self, middle_m: Vector2<f64>, look: &Look) {
+        if look.points < FEWEST_RETURNS {
+            return;
+        }
+        if look.is_cut == [false; 2] {
+            self.middle_m.push(middle_m);
+        }
+        for side in [0, 1] {
+            if !look.is_cut[side] {
+                self.ends_m[side].push(look.ends_m[side]);
+            }
+        }
+    }
+
+    pub(super) fn reframe(&mut self, moved: impl Fn([f64; 2]) -> [f64; 2] + Copy) {
+        self.middle_m.reframe(moved);
+        for end_m in &mut self.ends_m {
+            end_m.reframe(moved);
+        }
+    }
+
+    /// Whether what nothing hides in a look went a way, of something so long.
+    pub(super) fn shows_motion(&self, length_m: f64, look: &Look) -> bool {
+        match look.is_cut {
+            [false, false] => self.middle_m.shows_motion(length_m),
+            [false, true] => self.ends_m[0].shows_motion(length_m),
+            [true, false] => self.ends_m[1].shows_motion(length_m),
+            [true, true] => false,
+        }
     }
 }
 

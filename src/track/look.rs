@@ -1,0 +1,374 @@
+//! What is seen of an object in one revolution.
+//!
+//! A sensor sees one or two sides of a vehicle. The edges that face it are measured, the others
+//! follow from the size, which `shape` knows.
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::rectangle::{Extent, turned};
+use super::spots::Spot;
+use crate::cloud::{MAX_LAYERS, Scan};
+
+/// A group of returns in the axes of a box.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View {
+    /// Extent along and across the yaw, relative to the origin of the frame.
+    low_m: [f64; 2],
+    high_m: [f64; 2],
+    /// Whether an end is the object's own: it faces the sensor and nothing stands before it.
+    low_is_edge: [bool; 2],
+    high_is_edge: [bool; 2],
+    /// Whether both ends of an axis can be seen, so that its extent is the object's.
+    is_whole: [bool; 2],
+    /// Only a cabin or a rider is seen: what is below reaches farther to both ends.
+    is_upper: bool,
+    sine: f64,
+    cosine: f64,
+    range_m: f64,
+}
+
+/// Everything that is measured of a group without knowing the object.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Look {
+    /// Middle of the returns.
+    pub(super) middle_m: Vector2<f64>,
+    /// Mean time before the end of the sweep.
+    pub(super) age_s: f64,
+    pub(super) points: usize,
+    pub(super) floor_m: f64,
+    pub(super) top_m: f64,
+    /// Where the next ray passed over the top.
+    pub(super) top_below_m: f64,
+    /// Greatest extent of what is higher than a bonnet or a handlebar, if there is any of it.
+    pub(super) upper_m: Option<f64>,
+    /// Median jump of the range between neighbouring returns of a layer.
+    pub(super) roughness_m: f64,
+    /// Share of its columns in which it goes on above.
+    pub(super) goes_on: f64,
+    /// From the sensor to the middle.
+    pub(super) range_m: f64,
+    /// Hardly anything below the belt of a vehicle is seen.
+    is_upper: bool,
+    /// Its leftmost and rightmost returns, seen from the sensor.
+    pub(super) ends_m: [Vector2<f64>; 2],
+    /// Something nearer hides what is to the left or to the right.
+    pub(super) is_cut: [bool; 2],
+    sensor_m: Vector2<f64>,
+}
+
+/// What begins higher has lost its wheels and bumpers to the ground, or between two layers.
+const BELT_M: f64 = 0.55;
+/// Share of returns below it that shows a body.
+const LOW_SHARE: f64 = 0.15;
+/// A nearer return by this much beside an object hides a part of it.
+const OCCLUDER_M: f64 = 0.7;
+/// Columns beside an object that are looked at.
+const BESIDE: usize = 3;
+
+impl Look {
+    /// `spots` must not be empty.
+    pub(super) fn at(spots: &[Spot], scan: &Scan, sensor_m: Vector2<f64>) -> Self {
+        let count = spots.len() as f64;
+        let mut middle_m = Vector2::zeros();
+        let (mut age_s, mut floor_m, mut top_m) = (0.0, f64::MAX, f64::MIN);
+        let mut top_point = 0;
+        for spot in spots {
+            middle_m += spot.at_m / count;
+            age_s += spot.age_s / count;
+            floor_m = floor_m.min(spot.above_m);
+            if spot.above_m > top_m {
+                (top_m, top_point) = (spot.above_m, spot.point as usize);
+            }
+        }
+        let range_m = (middle_m - sensor_m).norm();
+        let layer = scan.layer(top_point);
+        let top_below_m = if layer + 1 < MAX_LAYERS && !is_covered(scan, top_point) {
+            top_m + range_m * (scan.slope(layer + 1).0 - scan.slope(layer).0)
+        } else {
+            f64::MAX
+        };
+        let low = spots.iter().filter(|spot| spot.above_m <= BELT_M).count();
+        let ends = ends(spots, sensor_m, middle_m);
+        Self {
+            middle_m,
+            age_s,
+            points: spots.len(),
+            floor_m,
+            top_m,
+            top_below_m,
+            upper_m: upper_m(spots),
+            roughness_m: roughness_m(spots, scan),
+            goes_on: goes_on(spots, scan),
+            range_m,
+            is_upper: (low as f64) < (LOW_SHARE * count).max(2.0),
+            ends_m: ends.map(|end| end.map_or(middle_m, |end| end.at_m)),
+            is_cut: cuts(spots, ends, scan),
+            sensor_m,
+        }
+    }
+
+    /// Direction from the sensor, as a unit vector.
+    pub(super) fn sight(&self) -> Vector2<f64> {
+        (self.middle_m - self.sensor_m) / self.range_m.max(0.1)
+    }
+
+    /// The same group in the axes of a yaw.
+    pub(super) fn view(&self, spots: &[Spot], yaw_rad: f64) -> View {
+        let (sine, cosine) = libm::sincos(yaw_rad);
+        let places_m = spots.iter().map(|spot| spot.at_m.into());
+        let Extent {
+            low: low_m,
+            high: high_m,
+        } = Extent::of(places_m, sine, cosine);
+        let sensor = turned(&self.sensor_m.into(), sine, cosine);
+        let sight = self.middle_m - self.sensor_m;
+        let left = Vector2::new(-sight.y, sight.x).normalize();
+        let left = turned(&left.into(), sine, cosine);
+        let mut view = View {
+            low_m,
+            high_m,
+            low_is_edge: [false; 2],
+            high_is_edge: [false; 2],
+            is_whole: [false; 2],
+            is_upper: false,
+            sine,
+            cosine,
+            range_m: self.range_m,
+        };
+        for axis in 0..2 {
+            // An end that lies to a hidden side is not the object's own.
+            let hidden = |sign: f64| {
+                (self.is_cut[0] && left[axis] * sign > 0.35)
+                    || (self.is_cut[1] && -left[axis] * sign > 0.35)
+            };
+            let middle_m = 0.5 * (low_m[axis] + high_m[axis]);
+            let reach_m = 0.5 * (high_m[axis] - low_m[axis]);
+            let offset_m = sensor[axis] - middle_m;
+            // The side along this axis shows where the line of sight crosses it.
+            let is_across = left[axis].abs() > 0.35;
+            let faces_low = offset_m < -reach_m;
+            let faces_high = offset_m > reach_m;
+            view.low_is_edge[axis] = (faces_low || is_across) && !hidden(-1.0);
+            view.high_is_edge[axis] = (faces_high || is_across) && !hidden(1.0);
+            // Of an end that faces away only the corner is seen.
+            if faces_low && !(is_across && reach_m > 0.8) {
+                view.high_is_edge[axis] = false;
+            }
+            if faces_high && !(is_across && reach_m > 0.8) {
+                view.low_is_edge[axis] = false;
+            }
+            view.is_whole[axis] = is_across && !hidden(1.0) && !hidden(-1.0);
+        }
+        if self.is_upper {
+            view.is_whole[0] = false;
+            view.is_upper = true;
+        }
+        view
+    }
+}
+
+impl View {
+    /// Length and width of what is seen.
+    pub(super) fn extent_m(&self) -> [f64; 2] {
+        [0, 1].map(|axis| self.high_m[axis] - self.low_m[axis])
+    }
+
+    /// Whether an extent is the whole of its side.
+    pub(super) fn is_whole(&self) -> [bool; 2] {
+        self.is_whole
+    }
+
+    /// Where the middle of a box of this size is, given where it is expected, and how sure
+    /// that is, as a covariance in the local frame.
+    pub(super) fn centre(
+        &self,
+        size_m: [f64; 2],
+        size_deviation_m: [f64; 2],
+        expected_m: Vector2<f64>,
+    ) -> (Vector2<f64>, Matrix2<f64>) {
+        /// Standard deviation of an edge: noise of ranges and roundness of corners.
+        const EDGE_M: f64 = 0.07;
+        /// Share of what is missing below a cabin by which its middle is off the vehicle's.
+        const UPPER: f64 = 0.4;
+        /// Share of the length that reaches out below a cabin to either end.
+        const INSET: f64 = 0.1;
+        /// What half a step between columns adds for each metre of range.
+        const EDGE_PER_M: f64 = 0.002;
+        let expected = [
+            expected_m.x * self.cosine + expected_m.y * self.sine,
+            expected_m.y * self.cosine - expected_m.x * self.sine,
+        ];
+        let edge_m = EDGE_M + EDGE_PER_M * self.range_m;
+        let mut centre = [0.0; 2];
+        let mut deviation = [0.0; 2];
+        for axis in 0..2 {
+            let (low, high) = (self.low_m[axis], self.high_m[axis]);
+            let half_m = 0.5 * size_m[axis].max(high - low);
+            let unsure_m = 0.5 * size_deviation_m[axis];
+            let is_inset = self.is_upper && axis == 0;
+            let inset_m = if is_inset {
+                (INSET * size_m[axis]).min((half_m - 0.5 * (high - low)).max(0.0))
+            } else {
+                0.0
+            };
+            let edge_m = edge_m + inset_m;
+            (centre[axis], deviation[axis]) =
+                match (self.low_is_edge[axis], self.high_is_edge[axis]) {
+                    (true, true) if is_inset => {
+                        let slack_m = half_m - 0.5 * (high - low);
+                        (0.5 * (low + high), edge_m + UPPER * slack_m)
+                    }
+                    // Seen from end to end; if it is shorter than known, some of it was missed.
+                    (true, true) => {
+                        let missed_m = half_m - 0.5 * (high - low);
+                        (
+                            expected[axis].clamp(
+                                0.5 * (low + high) - 0.5 * missed_m,
+                                0.5 * (low + high) + 0.5 * missed_m,
+                            ),
+                            edge_m + 0.5 * missed_m,
+                        )
+                    }
+                    (true, false) => (low - inset_m + half_m, libm::hypot(edge_m, unsure_m)),
+                    (false, true) => (high + inset_m - half_m, libm::hypot(edge_m, unsure_m)),
+                    (false, false) => {
+                        let slack_m = half_m - 0.5 * (high - low);
+                        let middle = 0.5 * (low + high);
+                        (
+                            expected[axis].clamp(middle - slack_m, middle + slack_m),
+                            edge_m + slack_m,
+                        )
+                    }
+                };
+        }
+        let local = |u: f64, v: f64| {
+            Vector2::new(
+                u * self.cosine - v * self.sine,
+                u * self.sine + v * self.cosine,
+            )
+        };
+        let turn = Matrix2::new(self.cosine, -self.sine, self.sine, self.cosine);
+        let spread = Matrix2::new(
+            deviation[0] * deviation[0],
+            0.0,
+            0.0,
+            deviation[1] * deviation[1],
+        );
+        (
+            local(centre[0], centre[1]),
+            turn * spread * turn.transpose(),
+        )
+    }
+}
+
+/// Whether something nearer hides what is above a point.
+fn is_covered(scan: &Scan, point: usize) -> bool {
+    let above_m = scan.range_m()[point + 1];
+    above_m > 0.0 && f64::from(above_m) < f64::from(scan.range_m()[point]) - OCCLUDER_M
+}
+
+/// Share of a group's columns in which the ray above its topmost return met something at the
+/// same distance.
+fn goes_on(spots: &[Spot], scan: &Scan) -> f64 {
+    /// Distance within which the next return is of the same thing.
+    const SAME_M: f32 = 0.8;
+    let (mut columns, mut on) = (0u32, 0u32);
+    for (number, spot) in spots.iter().enumerate() {
+        let point = spot.point as usize;
+        let is_top = spots
+            .get(number + 1)
+            .is_none_or(|next| scan.column(next.point as usize) != scan.column(point));
+        if is_top && scan.layer(point) + 1 < MAX_LAYERS {
+            let above_m = scan.range_m()[point + 1];
+            columns += 1;
+            on += u32::from(above_m > 0.0 && (above_m - scan.range_m()[point]).abs() < SAME_M);
+        }
+    }
+    f64::from(on) / f64::from(columns.max(1))
+}
+
+/// The leftmost and the rightmost of a group, seen from the sensor.
+fn ends(spots: &[Spot], sensor_m: Vector2<f64>, middle_m: Vector2<f64>) -> [Option<&Spot>; 2] {
+    let sight = middle_m - sensor_m;
+    let left = Vector2::new(-sight.y, sight.x);
+    let aside = |spot: &&Spot| left.dot(&(spot.at_m - sensor_m)) / (spot.at_m - sensor_m).norm();
+    let by_side = |a: &&Spot, b: &&Spot| aside(a).total_cmp(&aside(b));
+    [spots.iter().max_by(by_side), spots.iter().min_by(by_side)]
+}
+
+/// Whether something nearer stands directly to the left and to the right of a group.
+fn cuts(spots: &[Spot], ends: [Option<&Spot>; 2], scan: &Scan) -> [bool; 2] {
+    let layers = spots.iter().map(|spot| scan.layer(spot.point as usize));
+    let (low, high) = layers.fold((MAX_LAYERS, 0), |(low, high), layer| {
+        (low.min(layer), high.max(layer))
+    });
+    // Azimuths grow clockwise, so that the left is where columns come before.
+    let forward = scan.step_rad() > 0.0;
+    let directions = [!forward, forward];
+    let columns = scan.columns();
+    std::array::from_fn(|side| {
+        let Some(end) = ends[side] else { return false };
+        let point = end.point as usize;
+        let range_m = f64::from(scan.range_m()[point]);
+        (1..=BESIDE).any(|step| {
+            let step = if directions[side] {
+                step
+            } else {
+                columns - step
+            };
+            let next = (scan.column(point) + step) % columns;
+            (low..=high).any(|layer| {
+                let beside_m = scan.range_m()[scan.index(next, layer)];
+                beside_m > 0.0 && f64::from(beside_m) < range_m - OCCLUDER_M
+            })
+        })
+    })
+}
+
+/// Diagonal of the returns above the height of bonnets and handlebars.
+fn upper_m(spots: &[Spot]) -> Option<f64> {
+    const UPPER_M: f64 = 1.1;
+    let upper = spots.iter().filter(|spot| spot.above_m > UPPER_M);
+    let bounds = upper.fold(None, |bounds, spot| {
+        let (low, high, count) = bounds.unwrap_or((spot.at_m, spot.at_m, 0));
+        Some((low.inf(&spot.at_m), high.sup(&spot.at_m), count + 1))
+    });
+    let (low, high, count): (Vector2<f64>, Vector2<f64>, usize) = bounds?;
+    (count >= 2).then(|| (high - low).norm())
+}
+
+/// Median of the second difference of ranges along the layers: surfaces are smooth, leaves and
+/// grass are not.
+fn roughness_m(spots: &[Spot], scan: &Scan) -> f64 {
+    /// More say nothing new.
+    const MOST: usize = 128;
+    /// A jump between two surfaces says nothing of either.
+    const EDGE_M: f32 = 0.6;
+    let mut jumps = [0.0f32; MOST];
+    let mut count = 0;
+    let ranges = scan.range_m();
+    let columns = scan.columns();
+    let stride = spots.len().div_ceil(MOST).max(1);
+    for spot in spots.iter().step_by(stride) {
+        let point = spot.point as usize;
+        let (column, layer) = (scan.column(point), scan.layer(point));
+        let before = ranges[scan.index((column + columns - 1) % columns, layer)];
+        let after = ranges[scan.index((column + 1) % columns, layer)];
+        let here = ranges[point];
+        let near = |other: f32| other > 0.0 && (other - here).abs() < EDGE_M;
+        if near(before) && near(after) {
+            jumps[count] = (before + after - 2.0 * here).abs() * 0.5;
+            count += 1;
+        }
+    }
+    /// Fewer neighbours say nothing; most things are smooth.
+    const FEWEST: usize = 4;
+    if count < FEWEST {
+        return UNKNOWN_ROUGHNESS_M;
+    }
+    let middle = count / 2;
+    let (_, median, _) = jumps[..count].select_nth_unstable_by(middle, f32::total_cmp);
+    f64::from(*median)
+}
+
+const UNKNOWN_ROUGHNESS_M: f64 = 0.03;
