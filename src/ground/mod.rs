@@ -1,15 +1,12 @@
-//! Step three: the ground as a plane, and which returns lie on it (thesis section 4.1.1).
+//! Step three: the ground, and which returns lie on it (thesis section 4.1.1).
 //!
 //! `minima` gathers the lowest returns of every pie slice, `ransac` finds the plane that most
-//! of them lie on, `plane` has the geometry, this file follows the plane from revolution to
-//! revolution and marks the points.
+//! of them lie on, `plane` has the geometry, `surface` follows the heights above and below that
+//! plane outward, this file follows the plane from revolution to revolution and marks the points.
 
 mod minima;
-
 mod plane;
-
 mod ransac;
-
 mod surface;
 
 pub use plane::Plane;

@@ -14,8 +14,6 @@ pub struct Path {
     is_loop: bool,
     /// Times with the speed at them; between two, the speed changes evenly.
     speeds: Vec<(f64, f64)>,
-    /// How much of the way is behind at the beginning.
-    begun_m: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -56,8 +54,14 @@ impl Path {
             pieces: vec![],
             is_loop: false,
             speeds: vec![],
-            begun_m: 0.0,
         }
+    }
+
+    /// Straight on for longer than a scene lasts, at one speed.
+    pub fn straight(position_m: [f64; 2], yaw_deg: f64, speed_mps: f64) -> Self {
+        Self::from(position_m, yaw_deg)
+            .line(400.0)
+            .timed(&[(0.0, speed_mps)])
     }
 
     /// A circle around a place that is gone round and round, counter-clockwise where `radius_m`
@@ -96,12 +100,6 @@ impl Path {
         self
     }
 
-    /// With so much of the way behind at the beginning.
-    pub fn begun(mut self, begun_m: f64) -> Self {
-        self.begun_m = begun_m;
-        self
-    }
-
     /// All speeds times a factor.
     pub fn hurried(mut self, factor: f64) -> Self {
         for (_, speed_mps) in &mut self.speeds {
@@ -119,8 +117,7 @@ impl Path {
 
     /// Where it is after some time.
     pub fn at(&self, seconds: f64) -> Moment {
-        let (way_m, speed_mps, acceleration_mps2) = self.progress(seconds);
-        let travelled_m = self.begun_m + way_m;
+        let (travelled_m, speed_mps, acceleration_mps2) = self.progress(seconds);
         let total_m: f64 = self.pieces.iter().map(|piece| piece.length_m).sum();
         let mut left_m = travelled_m;
         if self.is_loop && total_m > 0.0 {

@@ -1,0 +1,70 @@
+//! The scenes themselves. Traffic drives on the right; x is east, y north.
+
+mod places;
+mod roads;
+mod roundabouts;
+
+use super::path::Path;
+use super::scenario::{Actor, Scenario, Variant};
+use crate::random::Random;
+
+pub(super) const ALL: &[Scenario] = &[
+    Scenario {
+        name: "roundabout",
+        summary: "a small roundabout of 30 m: three cars, three cyclists, a pedestrian; the \
+                  vehicle approaches, gives way, enters and leaves",
+        build: roundabouts::roundabout,
+    },
+    Scenario {
+        name: "roundabout-waiting",
+        summary: "the same roundabout from an entry, where the vehicle stands and has no pose",
+        build: roundabouts::roundabout_waiting,
+    },
+    Scenario {
+        name: "mini-roundabout",
+        summary: "a mini roundabout among hedges, trees and verges: two cars, a cyclist, two \
+                  pedestrians side by side",
+        build: roundabouts::mini_roundabout,
+    },
+    Scenario {
+        name: "street",
+        summary: "a street with parked cars, oncoming traffic, a bus, a cyclist, pedestrians, \
+                  and a turn to the right",
+        build: roads::street,
+    },
+    Scenario {
+        name: "car-park",
+        summary: "a car park: two rows of parked cars, one that leaves, two pedestrians",
+        build: places::car_park,
+    },
+    Scenario {
+        name: "hill",
+        summary: "a road over a hill, with verges and oncoming traffic",
+        build: roads::hill,
+    },
+    Scenario {
+        name: "occlusion",
+        summary: "a standing sensor; cars, cyclists and pedestrians pass behind a lorry, a \
+                  board and a van for a second or two",
+        build: places::occlusion,
+    },
+    Scenario {
+        name: "standing",
+        summary: "a standing sensor beside a road, with traffic at all ranges",
+        build: roads::standing,
+    },
+];
+
+/// Height of the sensor above the road: on the roof of a large car.
+const SENSOR_M: f64 = 2.0;
+/// From the middle of a road to the middle of a lane.
+const LANE_M: f64 = 1.75;
+
+/// A factor around 1.
+fn about(random: &mut Random, deviation: f64) -> f64 {
+    1.0 + deviation * (2.0 * random.uniform() - 1.0)
+}
+
+fn actor(variant: Variant, path: Path) -> Actor {
+    Actor { variant, path }
+}
