@@ -1,11 +1,13 @@
 //! Kreisel takes each revolution of a Velodyne VLP-16 from an OpenDaVINCI or OpenDLV
-//! session and answers it with a list of the road users around the vehicle.
+//! session and answers it with a list of the road users around the vehicle, and with what changed
+//! in a map of everything else.
 //!
 //! A revolution walks through the house once, front to back:
 //!
 //! ```text
 //! datagram -> wire -> cloud -> ground -> cluster -> track -> wire -> datagram
-//!                \-> ego ----------------------/
+//!                |        \_____________________\-> grid -/
+//!                \-> ego ----------------------/----/
 //! ```
 //!
 //! Everything but the shell is pure: no I/O, no clock, no thread, no global state. The same
@@ -29,6 +31,9 @@ pub mod cluster;
 
 // Which cluster is which object, from revolution to revolution.
 pub mod track;
+
+// What is static, and what is free.
+pub mod grid;
 
 // Objects to messages, messages to frames.
 pub mod publish;

@@ -4,6 +4,7 @@ use crate::cloud::{Dialect, Intake, Refusal, Revolution, Scan};
 use crate::cluster::Dbscan;
 use crate::config::Configuration;
 use crate::ego::{Ego, Heard, Pose, Sweep};
+use crate::grid::Grid;
 use crate::ground::{Ground, GroundReport, Origin};
 use crate::publish::{Heading, Publisher};
 use crate::tally::Tally;
@@ -42,6 +43,7 @@ pub struct Pipeline {
     ground: Ground,
     clusters: Dbscan,
     tracker: Tracker,
+    grid: Grid,
     publisher: Publisher,
     last: Option<RevolutionReport>,
     counts: Counts,
@@ -154,6 +156,7 @@ impl Pipeline {
             ground: Ground::new(&configuration.ground),
             clusters: Dbscan::new(&configuration.cluster),
             tracker: Tracker::new(&configuration.track),
+            grid: Grid::new(&configuration.grid),
             publisher: Publisher::new(&configuration.publish, sender_stamp),
             last: None,
             counts: Counts::default(),
@@ -219,6 +222,7 @@ impl Pipeline {
         if revolution.time_jumped {
             self.ground.reset();
             self.tracker.reset();
+            self.grid.reset();
         }
         self.scan.fill(revolution, &self.configuration.cloud);
         let swept = Span::from_seconds(-self.scan.duration_s());
@@ -231,6 +235,14 @@ impl Pipeline {
         let objects = self
             .tracker
             .process(&self.scan, clusters, heights_m, &ground, &sweep);
+        self.grid.process(
+            &self.scan,
+            self.ground.mask(),
+            heights_m,
+            &ground.plane,
+            objects,
+            &sweep,
+        );
 
         let report = RevolutionReport {
             number: self.last.map_or(0, |last| last.number.wrapping_add(1)),
@@ -263,7 +275,8 @@ impl Pipeline {
                 processing_s,
                 sweep: &self.sweep,
             };
-            self.publisher.publish(&heading, self.tracker.objects());
+            self.publisher
+                .publish(&heading, self.tracker.objects(), &mut self.grid);
         }
         self.publisher.frames()
     }
@@ -286,6 +299,11 @@ impl Pipeline {
     /// The last revolution's objects, by id.
     pub fn objects(&self) -> &[Object] {
         self.tracker.objects()
+    }
+
+    /// The map of the static world.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
     }
 
     /// What was counted so far.

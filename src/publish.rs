@@ -1,6 +1,7 @@
 //! Last step: objects become messages, and messages the frames that are sent.
 
 use crate::ego::{Pose, Sweep};
+use crate::grid::Grid;
 use crate::parameter::{choices, parameters};
 use crate::time::{Span, Time};
 use crate::track::Object;
@@ -83,8 +84,8 @@ impl Publisher {
             .map(|(start, end)| &self.bytes[start..*end])
     }
 
-    /// Makes the frames of a revolution.
-    pub fn publish(&mut self, heading: &Heading<'_>, objects: &[Object]) {
+    /// Makes the frames of a revolution: its objects, and what is to be sent of the map.
+    pub fn publish(&mut self, heading: &Heading<'_>, objects: &[Object], grid: &mut Grid) {
         self.bytes.clear();
         self.ends.clear();
         let (kept, omitted) = nearest(objects, self.parameters.most_objects, &heading.sweep.sensor);
@@ -106,6 +107,9 @@ impl Publisher {
                 &environment_of(heading.time + validity, &kept, &heading.sweep.sensor),
             );
         }
+        grid.publish(heading.time, heading.sweep, |tile| {
+            self.put(&postmark, tile)
+        });
     }
 
     fn put<M: Message>(&mut self, postmark: &Postmark, message: &M) {
@@ -281,6 +285,7 @@ impl Sight {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::GridParameters;
     use crate::parameter::Profile;
     use crate::track::Class;
     use crate::wire::Envelope;
@@ -325,7 +330,8 @@ mod tests {
         let mut parameters = PublishParameters::profile(Profile::Default);
         edit(&mut parameters);
         let mut publisher = Publisher::new(&parameters, 42);
-        publisher.publish(&heading(), objects);
+        let grid = &mut Grid::new(&GridParameters::profile(Profile::Default));
+        publisher.publish(&heading(), objects, grid);
         publisher
     }
 

@@ -1,14 +1,10 @@
 //! `labels.npz`: one int32 array [columns][layers] a revolution, for numpy.
 
-use std::fs::File;
-use std::io::{BufWriter, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use anyhow::{Context as _, Result};
-use zip::ZipWriter;
-use zip::write::SimpleFileOptions;
+use anyhow::Result;
 
-use super::files::Output;
+use super::npz::Archive;
 use crate::cloud::MAX_LAYERS;
 use crate::cluster::Clusters;
 use crate::pipeline::Pipeline;
@@ -21,17 +17,13 @@ const FIRST_CLUSTER: i32 = 100;
 /// Writes the archive revolution by revolution.
 #[derive(Debug)]
 pub(super) struct LabelWriter {
-    path: PathBuf,
-    archive: ZipWriter<BufWriter<File>>,
+    archive: Archive,
 }
 
 impl LabelWriter {
     pub(super) fn create(path: &Path) -> Result<Self> {
-        let file = Output::create(path)?.into_file()?;
-        Ok(Self {
-            path: path.into(),
-            archive: ZipWriter::new(BufWriter::new(file)),
-        })
+        let archive = Archive::create(path)?;
+        Ok(Self { archive })
     }
 
     /// Adds the labels of the pipeline's last revolution.
@@ -46,23 +38,13 @@ impl LabelWriter {
         labels: impl ExactSizeIterator<Item = i32>,
         revolution: u32,
     ) -> Result<()> {
-        let mut array = npy_header(labels.len() / MAX_LAYERS);
-        for label in labels {
-            array.extend_from_slice(&label.to_le_bytes());
-        }
-        let options = SimpleFileOptions::default();
-        let name = format!("r{revolution:06}.npy");
-        let result = self.archive.start_file(name, options).map_err(Into::into);
-        result
-            .and_then(|()| self.archive.write_all(&array))
-            .with_context(|| self.path.display().to_string())
+        let shape = [labels.len() / MAX_LAYERS, MAX_LAYERS];
+        self.archive
+            .put(&format!("r{revolution:06}"), &shape, labels)
     }
 
     pub(super) fn finish(self) -> Result<()> {
-        let finished = self.archive.finish().map_err(std::io::Error::from);
-        finished
-            .and_then(|mut writer| writer.flush())
-            .with_context(|| self.path.display().to_string())
+        self.archive.finish()
     }
 }
 
@@ -75,34 +57,6 @@ fn label(pipeline: &Pipeline, point: usize) -> i32 {
         match pipeline.clusters().labels()[point] {
             Clusters::NONE => NOISE,
             cluster => FIRST_CLUSTER + cluster,
-        }
-    }
-}
-
-/// The head of an array file (NumPy's format, version 1.0): padded to a multiple of 64 bytes.
-fn npy_header(columns: usize) -> Vec<u8> {
-    let mut text =
-        format!("{{'descr': '<i4', 'fortran_order': False, 'shape': ({columns}, {MAX_LAYERS}), }}");
-    const FIXED_LEN: usize = 10;
-    let padding = 63 - (FIXED_LEN + text.len()) % 64;
-    text.extend(std::iter::repeat_n(' ', padding));
-    text.push('\n');
-    let mut header = b"\x93NUMPY\x01\x00".to_vec();
-    header.extend_from_slice(&(text.len() as u16).to_le_bytes());
-    header.extend_from_slice(text.as_bytes());
-    header
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn array_headers_are_aligned() {
-        for columns in [1, 1810, 2000] {
-            let header = npy_header(columns);
-            assert_eq!(header.len() % 64, 0);
-            assert_eq!(header.last(), Some(&b'\n'));
         }
     }
 }

@@ -30,6 +30,10 @@ mod inspect;
 
 mod labels;
 
+mod map;
+
+mod npz;
+
 mod objects;
 
 mod process;

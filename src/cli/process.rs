@@ -8,7 +8,7 @@ use clap::Args;
 use super::files::Output;
 use super::labels::LabelWriter;
 use super::score::Score;
-use super::{Completion, files, objects};
+use super::{Completion, files, map, objects};
 use crate::pipeline::{Fault, Outcome, Pipeline, RevolutionReport};
 use crate::tally::Tally;
 use crate::time::Time;
@@ -30,6 +30,9 @@ pub(super) struct Arguments {
     /// Labels of all points, one array a revolution.
     #[arg(long, value_name = "OUT.npz")]
     labels: Option<PathBuf>,
+    /// The map at the end.
+    #[arg(long, value_name = "OUT.npz")]
+    grid: Option<PathBuf>,
     /// Truth to compare the objects with, as `kreisel simulate` writes it.
     #[arg(long, value_name = "FILE.jsonl")]
     truth: Option<PathBuf>,
@@ -59,7 +62,12 @@ struct Process<'a> {
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let configuration = files::configuration(arguments.config.as_deref())?;
     let bytes = files::read(&arguments.input)?;
-    let outputs = [&arguments.output, &arguments.objects, &arguments.labels];
+    let outputs = [
+        &arguments.output,
+        &arguments.objects,
+        &arguments.labels,
+        &arguments.grid,
+    ];
     files::check_distinct(&arguments.input, &outputs.map(Option::as_ref))?;
     if let Some(truth) = &arguments.truth {
         files::check_distinct(truth, &outputs.map(Option::as_ref))?;
@@ -169,6 +177,9 @@ impl Process<'_> {
         }
         if let Some(labels) = self.labels {
             labels.finish()?;
+        }
+        if let Some(path) = &self.arguments.grid {
+            map::write(path, self.pipeline.grid())?;
         }
         let (status, counts) = (self.pipeline.status(), self.pipeline.counts());
         say!(

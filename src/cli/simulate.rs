@@ -9,7 +9,7 @@ use tokio::time::{Instant, sleep_until};
 
 use super::files::{Output, progress};
 use super::labels::LabelWriter;
-use super::{Completion, objects};
+use super::{Completion, map, objects};
 use crate::daemon::session::Sender;
 use crate::simulate::Simulation;
 use crate::simulate::scenario::{self, Scenario};
@@ -38,6 +38,9 @@ pub(super) struct Arguments {
     /// True labels of all points: 0 no return, 1 ground, 2 structure, 100 + n road user n.
     #[arg(long, value_name = "FILE.npz")]
     labels: Option<PathBuf>,
+    /// True map at the end: bit 0 occupied, bit 1 seen, bit 2 passed by a ray.
+    #[arg(long, value_name = "FILE.npz")]
+    grid: Option<PathBuf>,
 }
 
 /// A day: longer ones are a slip of the pen.
@@ -109,6 +112,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let revolutions = (arguments.duration * ROTATION_HZ).round().max(1.0) as usize;
     let bar = progress(revolutions, "revolutions");
     let mut simulation = Simulation::new(*scenario, arguments.seed);
+    if arguments.grid.is_some() {
+        simulation.survey();
+    }
     let mut frame = vec![];
     for revolution in 0..revolutions {
         frame.clear();
@@ -126,5 +132,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     output.finish()?;
     truth.map_or(Ok(()), Output::finish)?;
     labels.map_or(Ok(()), LabelWriter::finish)?;
+    if let (Some(path), Some(map)) = (&arguments.grid, simulation.map()) {
+        map::write_truth(path, &map)?;
+    }
     Ok(Completion::Done)
 }

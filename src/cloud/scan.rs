@@ -29,6 +29,8 @@ pub struct Scan {
     step_rad: f64,
     /// Tangent and cosine of every layer's elevation.
     slopes: [(f64, f64); MAX_LAYERS],
+    /// Sine and cosine of every column's azimuth.
+    directions: Box<[[f32; 2]]>,
     range_m: Box<[f32]>,
     x_m: Box<[f32]>,
     y_m: Box<[f32]>,
@@ -45,6 +47,7 @@ impl Default for Scan {
             start_rad: 0.0,
             step_rad: 0.0,
             slopes: [(0.0, 1.0); MAX_LAYERS],
+            directions: vec![[0.0, 1.0]; MAX_COLUMNS].into_boxed_slice(),
             range_m: zeros(),
             x_m: zeros(),
             y_m: zeros(),
@@ -99,6 +102,7 @@ impl Scan {
         let (step_sine, step_cosine) = libm::sincos(self.step_rad);
         for column in 0..self.columns {
             let (sine_f32, cosine_f32) = (sine as f32, cosine as f32);
+            self.directions[column] = [sine_f32, cosine_f32];
             for (layer, (sine_v, cosine_v)) in elevation.iter().enumerate() {
                 let point = self.index(column, layer);
                 let range_m = self.range_m[point].max(0.0);
@@ -149,6 +153,11 @@ impl Scan {
     /// Azimuth of a column in radians, clockwise from y.
     pub fn azimuth_rad(&self, column: usize) -> f64 {
         self.start_rad + column as f64 * self.step_rad
+    }
+
+    /// Sine and cosine of a column's azimuth: its direction to the right and forward.
+    pub fn direction(&self, column: usize) -> [f32; 2] {
+        self.directions[column]
     }
 
     /// From one column to the next in radians; negative when azimuths fall.

@@ -6,6 +6,7 @@ pub mod text;
 use crate::cloud::CloudParameters;
 use crate::cluster::ClusterParameters;
 use crate::ego::EgoParameters;
+use crate::grid::GridParameters;
 use crate::ground::GroundParameters;
 use crate::parameter::{Profile, Section, parameters};
 use crate::publish::PublishParameters;
@@ -41,6 +42,8 @@ pub struct Configuration {
     pub cluster: ClusterParameters,
     /// Identities and objects.
     pub track: TrackParameters,
+    /// The map of the static world.
+    pub grid: GridParameters,
     /// What is sent.
     pub publish: PublishParameters,
     /// The network.
@@ -57,13 +60,14 @@ impl Configuration {
             ground: GroundParameters::profile(profile),
             cluster: ClusterParameters::profile(profile),
             track: TrackParameters::profile(profile),
+            grid: GridParameters::profile(profile),
             publish: PublishParameters::profile(profile),
             session: SessionParameters::profile(profile),
         }
     }
 
     /// The sections in the order in which a revolution meets them.
-    pub fn sections(&self) -> [&dyn Section; 7] {
+    pub fn sections(&self) -> [&dyn Section; 8] {
         let Self {
             profile: _,
             cloud,
@@ -71,14 +75,15 @@ impl Configuration {
             ground,
             cluster,
             track,
+            grid,
             publish,
             session,
         } = self;
-        [cloud, ego, ground, cluster, track, publish, session]
+        [cloud, ego, ground, cluster, track, grid, publish, session]
     }
 
     /// The same, to be set.
-    pub fn sections_mut(&mut self) -> [&mut dyn Section; 7] {
+    pub fn sections_mut(&mut self) -> [&mut dyn Section; 8] {
         let Self {
             profile: _,
             cloud,
@@ -86,10 +91,11 @@ impl Configuration {
             ground,
             cluster,
             track,
+            grid,
             publish,
             session,
         } = self;
-        [cloud, ego, ground, cluster, track, publish, session]
+        [cloud, ego, ground, cluster, track, grid, publish, session]
     }
 }
 

@@ -1,7 +1,7 @@
 //! A synthetic VLP-16 that drives through a scene, with the truth of every revolution.
 //!
 //! `solid` has the geometry of rays, `body` road users as solids, `terrain` and `scenery` the
-//! rest of a scene, `path` motion, `scenes` the scenes, `fixes` the vehicle's pose messages. This
+//! rest of a scene, `path` motion, `scenes` the scenes, `fixes` the vehicle's pose messages, `map` the true map. This
 //! file is the sensor: columns one after the other, each at its own time, while the vehicle and
 //! the scene move.
 //!
@@ -11,6 +11,8 @@
 mod body;
 
 mod fixes;
+
+pub mod map;
 
 pub mod path;
 
@@ -32,6 +34,7 @@ use crate::time::{Span, Time};
 use crate::wire::envelope::Postmark;
 use crate::wire::point_cloud::{CompactPointCloud, POINT_CLOUD_ID};
 use fixes::Receiver;
+use map::{Surveyor, TrueMap};
 use path::Moment;
 use scenario::{Class, PoseMessages, Scenario, Scene};
 use sight::{Carrier, Sight, Surface};
@@ -108,6 +111,7 @@ pub struct Simulation {
     column: u64,
     distances: Vec<u8>,
     labels: Vec<i32>,
+    surveyor: Option<Surveyor>,
 }
 
 /// What a ray of the last revolution ended on, as in the labels of `kreisel process`.
@@ -134,7 +138,20 @@ impl Simulation {
             column: 0,
             distances: vec![],
             labels: vec![],
+            surveyor: None,
         }
+    }
+
+    /// From now on notes what the true map of the scene looks like, for [`Simulation::map`].
+    pub fn survey(&mut self) {
+        self.surveyor = Some(Surveyor::default());
+    }
+
+    /// The true map as it is now, if it was surveyed.
+    pub fn map(&self) -> Option<TrueMap> {
+        let [x, y, _] = Carrier::of(&self.scene, 0.0).sensor_m;
+        let surveyor = self.surveyor.clone()?;
+        Some(surveyor.map(&self.scene, seconds_of(self.column), [x, y]))
     }
 
     /// What each ray of the last revolution ended on, see [`label`]; columns one after the
@@ -202,6 +219,12 @@ impl Simulation {
             let luck = &mut Random::new(self.seed ^ number.wrapping_mul(0x2545_f491_4f6c_dd1d));
             let ray = sight.ray(azimuth_rad, elevation_deg.to_radians());
             let nearest = sight.nearest(&ray, luck);
+            if let Some(surveyor) = &mut self.surveyor {
+                let end = nearest.map(|(hit, surface)| (hit.range_m, surface));
+                // A third of the columns, every time others, is enough to follow rays along.
+                let follow = (self.column + turn_of(self.column)).is_multiple_of(3);
+                surveyor.note(&self.scene, seconds_of(self.column), &ray, end, follow);
+            }
             let units = nearest.map_or(0, |(hit, _)| measured(&hit, luck));
             let label = match nearest {
                 _ if units == 0 => label::NO_RETURN,

@@ -106,6 +106,24 @@ impl Solid {
         }
     }
 
+    /// Whether a place lies within.
+    pub(super) fn contains(&self, at: &Vector) -> bool {
+        match &self.shape {
+            Shape::Convex(planes) => planes
+                .iter()
+                .all(|(normal, offset)| dot(normal, at) <= *offset),
+            Shape::Cylinder {
+                centre_m: [x, y],
+                radius_m,
+                low_m,
+                high_m,
+            } => {
+                libm::hypot(at[0] - x, at[1] - y) <= *radius_m
+                    && (*low_m..=*high_m).contains(&at[2])
+            }
+        }
+    }
+
     /// Radius around the origin of the frame that holds the outline of a convex solid, and the
     /// middle and radius of a cylinder.
     pub(super) fn bounds(&self) -> ([f64; 2], f64) {

@@ -122,6 +122,27 @@ impl FieldValue for String {
     }
 }
 
+/// Bytes with a meaning of their own.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Bytes(pub Vec<u8>);
+
+impl FieldValue for Bytes {
+    const KIND: &'static str = "bytes";
+
+    fn put(&self, out: &mut Vec<u8>, id: u32) {
+        put_key(out, id, 2);
+        put_length_delimited(out, |out| out.extend_from_slice(&self.0));
+    }
+
+    fn merge(&mut self, value: Value<'_>, _end: usize) -> Result<(), WireError> {
+        if let Value::Bytes(bytes) = value {
+            self.0.clear();
+            self.0.extend_from_slice(bytes);
+        }
+        Ok(())
+    }
+}
+
 /// OpenDaVINCI's `list<...>` of messages or strings: one length-delimited field with the
 /// elements end to end, each with its own length and no tag. To libcluon and protobuf, which
 /// have no such type, it is a `bytes` field.

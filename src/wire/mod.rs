@@ -22,6 +22,8 @@ pub mod pose;
 
 pub mod object_list;
 
+pub mod grid_tile;
+
 pub mod status;
 
 pub mod opendlv;

@@ -1,0 +1,255 @@
+//! What one revolution saw of the cells around the sensor, a bit each.
+
+use super::map::TILE_CELLS;
+
+/// Cells that rays passed and cells in which rays ended, in a square of tiles. A word of the
+/// planes is a row of a tile. However many rays meet a cell, it has one bit of each plane: a
+/// revolution counts once.
+#[derive(Debug, Clone)]
+pub(super) struct Window {
+    /// Tiles along a side.
+    side: usize,
+    /// The tile in the south-west corner.
+    first_tile: [i32; 2],
+    passed: Vec<u64>,
+    hit: Vec<u64>,
+}
+
+impl Window {
+    pub(super) fn new(side: usize) -> Self {
+        let words = side * side * TILE_CELLS;
+        Self {
+            side,
+            first_tile: [0; 2],
+            passed: vec![0; words],
+            hit: vec![0; words],
+        }
+    }
+
+    /// Empties it for a revolution with this tile in the south-west corner.
+    pub(super) fn begin(&mut self, first_tile: [i32; 2]) {
+        self.first_tile = first_tile;
+        self.passed.fill(0);
+        self.hit.fill(0);
+    }
+
+    /// Tiles along a side.
+    pub(super) fn side(&self) -> usize {
+        self.side
+    }
+
+    /// The tile at a place counted from the south-west corner.
+    pub(super) fn tile(&self, x: usize, y: usize) -> [i32; 2] {
+        [self.first_tile[0] + x as i32, self.first_tile[1] + y as i32]
+    }
+
+    /// Cells along a side.
+    fn cells(&self) -> usize {
+        self.side * TILE_CELLS
+    }
+
+    /// The south-west corner, in cells of the local frame.
+    pub(super) fn corner(&self) -> [f64; 2] {
+        self.first_tile
+            .map(|tile| f64::from(tile) * TILE_CELLS as f64)
+    }
+
+    /// Marks every cell that a straight way crosses, in cells from the south-west corner. Row by
+    /// row, all cells between where the way enters the row and where it leaves it: none is left
+    /// out. What lies outside is left out.
+    pub(super) fn pass(&mut self, from: [f64; 2], to: [f64; 2]) {
+        let ([x0, y0], [x1, y1]) = if from[1] <= to[1] {
+            (from, to)
+        } else {
+            (to, from)
+        };
+        let slope = if y1 > y0 { (x1 - x0) / (y1 - y0) } else { 0.0 };
+        let top = self.cells() as f64;
+        if y1 < 0.0 || y0 >= top {
+            return;
+        }
+        let (first, last) = (y0.max(0.0) as usize, y1.min(top - 1.0) as usize);
+        let mut enters = x0 + (first as f64 - y0).max(0.0) * slope;
+        for row in first..last {
+            let leaves = x0 + ((row + 1) as f64 - y0) * slope;
+            self.pass_row(row, enters, leaves);
+            enters = leaves;
+        }
+        let leaves = if y1 < top { x1 } else { enters + slope };
+        self.pass_row(last, enters, leaves);
+    }
+
+    /// Marks the cells of a row from one place to another.
+    fn pass_row(&mut self, row: usize, a: f64, b: f64) {
+        let (low, high) = (a.min(b), a.max(b));
+        let cells = self.cells();
+        if high < 0.0 || low >= cells as f64 {
+            return;
+        }
+        let (first, last) = (low.max(0.0) as usize, (high as usize).min(cells - 1));
+        let words = &mut self.passed[row * self.side..(row + 1) * self.side];
+        let (first_word, last_word) = (first / TILE_CELLS, last / TILE_CELLS);
+        let from_first = !0 << (first % TILE_CELLS);
+        let to_last = !0 >> (TILE_CELLS - 1 - last % TILE_CELLS);
+        if first_word == last_word {
+            words[first_word] |= from_first & to_last;
+            return;
+        }
+        words[first_word] |= from_first;
+        words[first_word + 1..last_word].fill(!0);
+        words[last_word] |= to_last;
+    }
+
+    /// Marks the cell in which a ray ended, in cells from the south-west corner. Gives it, or
+    /// `None` where it lies outside.
+    pub(super) fn hit(&mut self, [x, y]: [f64; 2]) -> Option<Cell> {
+        let inside = 0.0..self.cells() as f64;
+        if !inside.contains(&x) || !inside.contains(&y) {
+            return None;
+        }
+        let cell = Cell {
+            row: y as u16,
+            column: x as u16,
+        };
+        let (word, bit) = self.place(cell);
+        self.hit[word] |= bit;
+        Some(cell)
+    }
+
+    fn place(&self, cell: Cell) -> (usize, u64) {
+        let column = usize::from(cell.column);
+        let word = usize::from(cell.row) * self.side + column / TILE_CELLS;
+        (word, 1 << (column % TILE_CELLS))
+    }
+
+    /// Whether a cell in which rays ended was not asked for before.
+    pub(super) fn take_hit(&mut self, cell: Cell) -> bool {
+        let (word, bit) = self.place(cell);
+        let is_first = self.hit[word] & bit != 0;
+        self.hit[word] &= !bit;
+        is_first
+    }
+
+    /// Cells of a row of a tile that were passed and in which no ray ended: within a revolution
+    /// a return weighs more than any ray that went through.
+    pub(super) fn free(&self, x: usize, y: usize, row: usize) -> u64 {
+        let word = (y * TILE_CELLS + row) * self.side + x;
+        self.passed[word] & !self.hit[word]
+    }
+}
+
+/// A cell of the window, counted from the south-west corner.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Cell {
+    row: u16,
+    column: u16,
+}
+
+impl Cell {
+    /// Its tile, counted from the south-west corner, and its place in it.
+    pub(super) fn in_tile(self) -> ([usize; 2], usize) {
+        let (row, column) = (usize::from(self.row), usize::from(self.column));
+        let place = row % TILE_CELLS * TILE_CELLS + column % TILE_CELLS;
+        ([column / TILE_CELLS, row / TILE_CELLS], place)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    fn passed(window: &Window) -> Vec<[usize; 2]> {
+        let cells = window.cells();
+        let all = (0..cells * cells).map(|n| [n % cells, n / cells]);
+        let is_passed = |[x, y]: &[usize; 2]| {
+            let word = window.passed[y * window.side + x / TILE_CELLS];
+            word >> (x % TILE_CELLS) & 1 == 1
+        };
+        all.filter(is_passed).collect()
+    }
+
+    /// Length of the part of a way that lies in a cell (Liang, Barsky 1984).
+    fn length_within([x, y]: [usize; 2], from: [f64; 2], to: [f64; 2]) -> f64 {
+        let (mut enter, mut leave) = (0.0f64, 1.0f64);
+        for (axis, low) in [x as f64, y as f64].into_iter().enumerate() {
+            let rate = to[axis] - from[axis];
+            let (a, b) = ((low - from[axis]) / rate, (low + 1.0 - from[axis]) / rate);
+            enter = enter.max(a.min(b));
+            leave = leave.min(a.max(b));
+        }
+        (leave - enter) * f64::hypot(to[0] - from[0], to[1] - from[1])
+    }
+
+    #[test]
+    fn a_way_marks_exactly_the_cells_that_it_crosses() {
+        let mut random = Random::new(1);
+        let mut window = Window::new(2);
+        for _ in 0..300 {
+            let mut place = || [130.0 * random.uniform(), 127.9 * random.uniform()];
+            let (from, to) = (place(), place());
+            window.begin([0, 0]);
+            window.pass(from, to);
+            let marked = passed(&window);
+            for cell in &marked {
+                assert!(length_within(*cell, from, to) > -1e-6, "{cell:?}");
+            }
+            for x in 0..128 {
+                for y in 0..128 {
+                    if length_within([x, y], from, to) > 1e-6 {
+                        assert!(marked.contains(&[x, y]), "{x} {y} {from:?} {to:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn ways_along_a_row_a_column_and_in_one_cell_are_marked() {
+        for (from, to, expected) in [
+            ([3.5, 7.5], [9.5, 7.5], 7),
+            ([3.5, 7.5], [3.5, 1.5], 7),
+            ([3.2, 7.5], [3.7, 7.6], 1),
+            ([60.5, 0.5], [70.5, 0.5], 11),
+        ] {
+            let mut window = Window::new(2);
+            window.pass(from, to);
+            assert_eq!(passed(&window).len(), expected, "{from:?}");
+        }
+    }
+
+    #[test]
+    fn what_lies_outside_is_left_out() {
+        let mut window = Window::new(1);
+        window.pass([-30.5, -30.0], [100.0, 100.5]);
+        let across = passed(&window);
+        window.begin([5, 5]);
+        window.pass([0.0, 0.5], [63.5, 64.0]);
+        assert_eq!(across, passed(&window));
+        window.begin([5, 5]);
+        for (from, to) in [
+            ([-9.0, 3.0], [-1.0, 60.0]),
+            ([70.0, 3.0], [90.0, 60.0]),
+            ([3.0, 64.0], [60.0, 99.0]),
+            ([3.0, -64.0], [60.0, -9.0]),
+        ] {
+            window.pass(from, to);
+        }
+        assert_eq!(passed(&window).len(), 0);
+        for outside in [[-0.1, 3.0], [64.0, 3.0], [3.0, f64::NAN]] {
+            assert_eq!(window.hit(outside), None);
+        }
+    }
+
+    #[test]
+    fn a_return_counts_once_and_outweighs_the_rays_that_pass() {
+        let mut window = Window::new(1);
+        window.pass([0.5, 0.5], [10.5, 0.5]);
+        let cell = window.hit([4.2, 0.9]).unwrap();
+        assert_eq!(window.hit([4.8, 0.1]), Some(cell));
+        assert_eq!(window.free(0, 0, 0), 0b111_1110_1111);
+        assert!(window.take_hit(cell));
+        assert!(!window.take_hit(cell));
+        assert_eq!(cell.in_tile(), ([0, 0], 4));
+    }
+}
