@@ -10,6 +10,7 @@ use kreisel::random::Random;
 use kreisel::time::{Span, Time};
 use kreisel::wire::envelope::Postmark;
 use kreisel::wire::frame::HEADER_LEN;
+use kreisel::wire::grid_tile::GridTile;
 use kreisel::wire::object_list::{Object, ObjectList};
 use kreisel::wire::point_cloud::{
     ByteOrder, CompactPointCloud, DistanceEncoding, IntensityPlacement, POINT_CLOUD_ID, Schema,
@@ -107,13 +108,18 @@ impl Session {
         result
     }
 
-    /// Exactly one frame, an object list of numbers that are finite.
+    /// An object list of numbers that are finite, and tiles that can be drawn.
     fn check_answer(&mut self, question: &Envelope<'_>) {
         self.answers += 1;
         let frames: Vec<_> = self.pipeline.publish(self.now, 0.01).collect();
-        let [frame] = frames[..] else {
-            panic!("{} frames", frames.len())
+        let [frame, tiles @ ..] = &frames[..] else {
+            panic!("no frames")
         };
+        for frame in tiles {
+            let (envelope, _) = Envelope::from_datagram(frame).unwrap();
+            let tile = GridTile::decode(envelope.payload, envelope.payload_offset).unwrap();
+            assert!(tile.levels(tile.map_id).is_ok(), "{tile:?}");
+        }
         let (envelope, rest) = Envelope::from_datagram(frame).unwrap();
         assert_eq!(
             (envelope.data_type, envelope.sender_stamp, rest),

@@ -14,6 +14,8 @@ struct Ray {
     end_m: f32,
     /// Change of its height for each metre.
     rise: f32,
+    /// Whether it ends on the ground, so that its height is known along all of its way.
+    lands: bool,
 }
 
 /// The rays of a revolution over the ground.
@@ -22,14 +24,22 @@ pub(super) struct Evidence {
     /// Height of the sensor.
     sensor_m: f32,
     rays: Vec<Ray>,
-    /// Returns on road users that move.
-    pub(super) is_moving: Vec<bool>,
+    /// Distance of every return that is an obstacle, and of the nearest one of every column.
+    obstacles_m: Vec<f32>,
+    nearest_m: Vec<f32>,
 }
+
+/// There is no obstacle.
+const NONE_M: f32 = f32::MAX;
+/// Columns to either side in which a surface is looked for that a ray may have missed: one that
+/// was lost on it, or one that found a gap between leaves.
+const BESIDE: usize = 2;
 
 /// How far before a return its ray is known to be free: returns scatter along the ray.
 const BEFORE_RETURN_M: f32 = 0.05;
-/// Height below the ground down to which a ray that found no ground goes on.
-const BELOW_M: f32 = -0.3;
+/// How unsure the height of a ray that does not land is for each metre of distance: the tilt of
+/// the ground is known to a degree.
+const UNSURE_PER_M: f32 = 0.02;
 
 impl Evidence {
     /// Takes a revolution's rays in.
@@ -37,12 +47,12 @@ impl Evidence {
         &mut self,
         scan: &Scan,
         plane: &Plane,
+        ground: &[bool],
         heights_m: &[f32],
         parameters: &GridParameters,
     ) {
+        self.find_obstacles(scan, ground, heights_m, parameters);
         self.sensor_m = plane.height_m() as f32;
-        self.is_moving.clear();
-        self.is_moving.resize(scan.len(), false);
         let normal = plane.normal().map(|part| part as f32);
         let no_return_m = match parameters.no_return {
             NoReturn::Clear => parameters.reach_m,
@@ -61,50 +71,70 @@ impl Evidence {
                     Ray {
                         end_m: distance_m,
                         rise: (heights_m[point] - self.sensor_m) / distance_m,
+                        lands: ground[point],
                     }
                 } else if range_m < 0.0 {
                     Ray::default()
                 } else {
                     let rise = level + normal[2] * scan.slope(layer).0 as f32;
-                    let ground_m = (BELOW_M - self.sensor_m) / rise;
+                    let ground_m = -self.sensor_m / rise;
                     let falls = rise < 0.0 && ground_m < no_return_m;
                     let end_m = if falls { ground_m } else { no_return_m };
                     Ray {
                         end_m: end_m.min(nearest_beside_m(scan, column, layer)),
                         rise,
+                        lands: false,
                     }
                 });
             }
         }
     }
 
-    /// Whether a return stands on the ground within the heights of obstacles.
-    pub(super) fn is_obstacle(
-        &self,
-        point: usize,
+    /// Finds the returns that stand on the ground within the heights of obstacles.
+    fn find_obstacles(
+        &mut self,
         scan: &Scan,
         ground: &[bool],
         heights_m: &[f32],
         parameters: &GridParameters,
-    ) -> bool {
+    ) {
         let low_m = parameters.obstacle_low_m as f32;
         let high_m = parameters.obstacle_high_m as f32;
-        scan.has_return(point) && !ground[point] && (low_m..=high_m).contains(&heights_m[point])
+        let heights = low_m..=high_m;
+        self.obstacles_m.clear();
+        self.obstacles_m.extend((0..scan.len()).map(|point| {
+            let is_obstacle =
+                scan.has_return(point) && !ground[point] && heights.contains(&heights_m[point]);
+            if is_obstacle {
+                scan.distance_m(point)
+            } else {
+                NONE_M
+            }
+        }));
+        self.nearest_m.clear();
+        let columns = self.obstacles_m.chunks_exact(MAX_LAYERS);
+        self.nearest_m
+            .extend(columns.map(|layers| layers.iter().copied().fold(NONE_M, f32::min)));
+    }
+
+    /// Distance of a return, if it is an obstacle.
+    pub(super) fn obstacle_m(&self, point: usize) -> Option<f32> {
+        Some(self.obstacles_m[point]).filter(|distance_m| *distance_m < NONE_M)
     }
 
     /// Where a column's rays are known to have passed low enough to say that nothing is there:
     /// before the first obstacle below the height of what hangs over the road; behind it only
-    /// where they went over it and come down to the ground again. `obstacles_m` are the
-    /// distances of the layers' obstacles.
+    /// where they went over it and come down to the ground again.
     pub(super) fn passed(
         &self,
         column: usize,
         scan: &Scan,
-        obstacles_m: &[f32; MAX_LAYERS],
         parameters: &GridParameters,
     ) -> Intervals {
         let reach_m = parameters.reach_m as f32;
-        let nearest_m = obstacles_m.iter().copied().fold(reach_m, f32::min);
+        let nearest_m = beside(column, scan.columns())
+            .map(|column| self.nearest_m[column])
+            .fold(reach_m, f32::min);
         let mut passed = Intervals::default();
         passed.add(0.0, parameters.nearest_m as f32);
         // Of the obstacles that higher rays met: this one goes on under them.
@@ -119,7 +149,7 @@ impl Evidence {
                 let (from_m, to_m) = self.below(&ray, parameters.low_pass_m as f32);
                 passed.add(from_m, to_m.min(end_m).min(roof_m));
             }
-            roof_m = roof_m.min(obstacles_m[layer]);
+            roof_m = roof_m.min(self.obstacles_m[point]);
         }
         passed
     }
@@ -136,25 +166,29 @@ impl Evidence {
         }
     }
 
-    /// Height of the lowest ray of a column that goes on beyond a distance.
+    /// Height below which a column's lowest ray that goes on beyond a distance is at least.
     pub(super) fn lowest_pass_m(&self, column: usize, distance_m: f32) -> f32 {
         let rays = &self.rays[column * MAX_LAYERS..(column + 1) * MAX_LAYERS];
         let beyond = rays.iter().filter(|ray| ray.end_m > distance_m);
         beyond
-            .map(|ray| self.sensor_m + ray.rise * distance_m)
+            .map(|ray| {
+                let unsure_per_m = if ray.lands { 0.0 } else { UNSURE_PER_M };
+                self.sensor_m + (ray.rise + unsure_per_m) * distance_m
+            })
             .fold(f32::MAX, f32::min)
     }
 }
 
-/// Distance of the nearest return in a layer a few columns to either side: a single ray that
-/// is lost on a surface does not go through it.
+/// A column and those close beside it, over the seam where the sweep begins.
+fn beside(column: usize, columns: usize) -> impl Iterator<Item = usize> {
+    (columns - BESIDE.min(columns)..=columns + BESIDE).map(move |at| (column + at) % columns)
+}
+
+/// Distance of the nearest return in a layer close beside a column.
 fn nearest_beside_m(scan: &Scan, column: usize, layer: usize) -> f32 {
-    const BESIDE: usize = 2;
-    let columns = scan.columns();
-    let beside = (columns - BESIDE.min(columns)..=columns + BESIDE).filter(|at| *at != columns);
-    let points = beside.map(|at| scan.index((column + at) % columns, layer));
+    let points = beside(column, scan.columns()).map(|column| scan.index(column, layer));
     points
         .filter(|point| scan.has_return(*point))
         .map(|point| scan.distance_m(point))
-        .fold(f32::MAX, f32::min)
+        .fold(NONE_M, f32::min)
 }

@@ -29,7 +29,7 @@ pub struct Tile {
     pub(super) top: [u8; CELLS],
     /// Cells that are as free as a cell can be, a word a row.
     pub(super) surely_free: [u64; TILE_CELLS],
-    /// By how many levels its cells changed since it was sent.
+    /// How often a cell of it became free, unknown or occupied since it was sent.
     pub(super) change: u32,
     /// Revolution of the last change of a level.
     pub(super) revision: u32,
@@ -67,11 +67,16 @@ impl Tile {
         (self.sent, self.encoded_revision) = (None, None);
     }
 
-    /// Notes by how many levels its cells changed in a revolution.
-    pub(super) fn note_change(&mut self, levels: u32, revolution: u32) {
-        if levels > 0 {
-            self.change += levels;
+    /// Sets a cell in a revolution.
+    pub(super) fn set(&mut self, cell: usize, log_odds: i16, revolution: u32) {
+        let [before, after] = [self.log_odds[cell], log_odds].map(level);
+        self.log_odds[cell] = log_odds;
+        if log_odds <= 0 {
+            self.top[cell] = 0;
+        }
+        if before != after {
             self.revision = revolution;
+            self.change += u32::from(before.signum() != after.signum());
         }
     }
 

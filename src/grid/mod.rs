@@ -19,7 +19,7 @@ mod window;
 
 pub use map::{Map, TILE_CELLS, Tile};
 
-use crate::cloud::{CAPACITY, Scan};
+use crate::cloud::{CAPACITY, MAX_LAYERS, Scan};
 use crate::ego::{Placement, Sweep};
 use crate::ground::Plane;
 use crate::parameter::{choices, parameters};
@@ -116,6 +116,8 @@ pub struct Grid {
     revolution: u32,
     window: Window,
     evidence: Evidence,
+    /// Returns on road users that move.
+    is_moving: Vec<bool>,
     hits: Vec<(Cell, u8)>,
     placements: Vec<Placement>,
     updates: Updates,
@@ -154,6 +156,7 @@ impl Grid {
             revolution: 0,
             window: Window::new(window_side),
             evidence: Evidence::default(),
+            is_moving: Vec::with_capacity(CAPACITY),
             hits: Vec::with_capacity(CAPACITY),
             placements: vec![],
             updates: Updates::new(parameters),
@@ -239,12 +242,14 @@ impl Grid {
         let half = (self.window.side() / 2) as i32;
         self.window.begin(home.map(|tile| tile - half));
         self.evidence
-            .begin(scan, plane, heights_m, &self.parameters);
+            .begin(scan, plane, ground, heights_m, &self.parameters);
+        self.is_moving.clear();
+        self.is_moving.resize(scan.len(), false);
         for object in objects {
             self.note_moving(scan, object, sweep);
         }
         sweep.placements(scan.columns(), &mut self.placements);
-        self.collect(scan, ground, heights_m);
+        self.collect(scan, heights_m);
         self.free_cells(scan, sweep);
         self.occupy_cells();
         for object in objects {
@@ -269,9 +274,15 @@ impl Grid {
         };
     }
 
+    /// Whether a road user is seen to move, without a doubt.
+    fn moves(&self, object: &Object) -> bool {
+        let least_mps = self.parameters.moving_mps + object.speed_deviation_mps;
+        object.measured && libm::fabs(object.speed_mps) > least_mps
+    }
+
     /// Marks the returns on a road user that moves. Each was where it was when it was seen.
     fn note_moving(&mut self, scan: &Scan, object: &Object, sweep: &Sweep) {
-        if object.speed_mps.abs() < self.parameters.moving_mps {
+        if !self.moves(object) {
             return;
         }
         let placement = sweep.sensor.placement();
@@ -292,7 +303,7 @@ impl Grid {
         let first = (first + columns - aside.min(columns)) % columns;
         for column in (first..first + (count + 2 * aside).min(columns)).map(|n| n % columns) {
             let age_s = scan.age_s(column);
-            for layer in 0..crate::cloud::MAX_LAYERS {
+            for layer in 0..MAX_LAYERS {
                 let point = scan.index(column, layer);
                 if !scan.has_return(point) {
                     continue;
@@ -303,7 +314,7 @@ impl Grid {
                     .placement()
                     .local_m([x, y]);
                 let then = [x + age_s * velocity_mps[0], y + age_s * velocity_mps[1]];
-                self.evidence.is_moving[point] |= outline.distance_m(then) <= margin_m;
+                self.is_moving[point] |= outline.distance_m(then) <= margin_m;
             }
         }
     }
@@ -311,7 +322,7 @@ impl Grid {
     /// Where something moves nothing stands: takes back what was seen in its box, and, as long
     /// as it is new, in those before.
     fn clear_way(&mut self, object: &Object, now: Time) {
-        if object.speed_mps.abs() < self.parameters.moving_mps {
+        if !self.moves(object) {
             return;
         }
         let age_s = (now - object.first_seen).seconds();
@@ -341,35 +352,30 @@ impl Grid {
                 if let Some((tile, place)) = self.map.cell_mut([x, y])
                     && tile.log_odds[place] > 0
                 {
-                    let change = map::level(tile.log_odds[place]).unsigned_abs();
-                    (tile.log_odds[place], tile.top[place]) = (0, 0);
-                    tile.note_change(u32::from(change), self.revolution);
+                    tile.set(place, 0, self.revolution);
                 }
             }
         }
     }
 
     /// Marks cells that rays passed, and those in which rays ended.
-    fn collect(&mut self, scan: &Scan, ground: &[bool], heights_m: &[f32]) {
+    fn collect(&mut self, scan: &Scan, heights_m: &[f32]) {
         self.hits.clear();
         let per_cell = 1.0 / self.parameters.cell_m;
         let corner = self.window.corner();
         let reach_m = self.parameters.reach_m as f32;
+        // A beam is nearly as wide as the step from column to column (VLP-16 user manual: 3
+        // mrad). Where that is more than a cell, it is cast as several rays beside each other.
+        let step_rad = libm::fabs(scan.step_rad());
+        let dense_m = self.parameters.cell_m / step_rad;
+        let beams = libm::ceil(self.parameters.reach_m / dense_m) as usize;
         for column in 0..scan.columns() {
             let placement = self.placements[column];
             let cells = |at_m: [f64; 2]| [0, 1].map(|axis| at_m[axis] * per_cell - corner[axis]);
-            let mut obstacles_m = [f32::MAX; crate::cloud::MAX_LAYERS];
-            for (layer, obstacle_m) in obstacles_m.iter_mut().enumerate() {
+            for layer in 0..MAX_LAYERS {
                 let point = scan.index(column, layer);
-                let is_obstacle =
-                    self.evidence
-                        .is_obstacle(point, scan, ground, heights_m, &self.parameters);
-                if !is_obstacle {
-                    continue;
-                }
-                let distance_m = scan.distance_m(point);
-                *obstacle_m = distance_m;
-                if self.evidence.is_moving[point] || distance_m > reach_m {
+                let near = |distance_m: &f32| *distance_m <= reach_m && !self.is_moving[point];
+                if self.evidence.obstacle_m(point).filter(near).is_none() {
                     continue;
                 }
                 let [x, y, _] = scan.point_m(point).map(f64::from);
@@ -379,15 +385,24 @@ impl Grid {
                 }
             }
             let [sine, cosine] = scan.direction(column).map(f64::from);
-            let passed = self
-                .evidence
-                .passed(column, scan, &obstacles_m, &self.parameters);
+            let passed = self.evidence.passed(column, scan, &self.parameters);
+            let at = |metres: f64, aside: f64| {
+                let (right, ahead) = (sine + aside * cosine, cosine - aside * sine);
+                cells(placement.local_m([metres * right, metres * ahead]))
+            };
             for (from_m, to_m) in passed.iter() {
-                let at = |metres: f32| {
-                    let metres = f64::from(metres);
-                    cells(placement.local_m([metres * sine, metres * cosine]))
-                };
-                self.window.pass(at(from_m), at(to_m));
+                let (from_m, to_m) = (f64::from(from_m), f64::from(to_m));
+                if from_m < dense_m {
+                    self.window
+                        .pass(at(from_m, 0.0), at(to_m.min(dense_m), 0.0));
+                }
+                if to_m > dense_m {
+                    for n in 0..beams {
+                        let aside = scan.step_rad() * ((n as f64 + 0.5) / beams as f64 - 0.5);
+                        self.window
+                            .pass(at(from_m.max(dense_m), aside), at(to_m, aside));
+                    }
+                }
             }
         }
     }
@@ -405,7 +420,6 @@ impl Grid {
                 }
                 let place = self.window.tile(x, y);
                 let tile = self.map.tile_mut(place);
-                let mut change = 0;
                 for row in 0..TILE_CELLS {
                     let mut cells = self.window.free(x, y, row) & !tile.surely_free[row];
                     let north = f64::from(place[1]) * TILE_CELLS as f64 + row as f64 + 0.5;
@@ -422,26 +436,20 @@ impl Grid {
                             let at = placement.sensor_m([east * cell_m, north * cell_m]);
                             let azimuth = scan.column_at(libm::atan2(at[0], at[1]));
                             let top_m = f32::from(tile.top[cell]) * HEIGHT_UNIT_M;
-                            let pass_m = self
-                                .evidence
-                                .lowest_pass_m(azimuth, (distance * cell_m) as f32);
+                            let distance_m = (distance * cell_m) as f32;
+                            let pass_m = self.evidence.lowest_pass_m(azimuth, distance_m);
                             if pass_m > (BELOW_SHARE * top_m).min(top_m - BELOW_TOP_M) {
                                 continue;
                             }
                         }
                         let step = self.passed[(distance as usize).min(self.passed.len() - 1)];
                         let after = (before + step).max(self.lowest);
-                        tile.log_odds[cell] = after;
-                        if after <= 0 {
-                            tile.top[cell] = 0;
-                        }
+                        tile.set(cell, after, self.revolution);
                         if after == self.lowest {
                             tile.surely_free[row] |= 1 << column;
                         }
-                        change += map::level(before).abs_diff(map::level(after));
                     }
                 }
-                tile.note_change(u32::from(change), self.revolution);
             }
         }
     }
@@ -451,15 +459,13 @@ impl Grid {
         for (cell, top) in &self.hits {
             let ([x, y], place) = cell.in_tile();
             let tile = self.map.tile_mut(self.window.tile(x, y));
-            tile.top[place] = tile.top[place].max(*top);
             if self.window.take_hit(*cell) {
                 let before = tile.log_odds[place];
                 let after = (before + self.hit).min(self.highest);
-                tile.log_odds[place] = after;
+                tile.set(place, after, self.revolution);
                 tile.surely_free[place / TILE_CELLS] &= !(1 << (place % TILE_CELLS));
-                let change = map::level(before).abs_diff(map::level(after));
-                tile.note_change(u32::from(change), self.revolution);
             }
+            tile.top[place] = tile.top[place].max(*top);
         }
     }
 }

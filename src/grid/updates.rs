@@ -30,8 +30,8 @@ struct Candidate {
     place: [i32; 2],
 }
 
-/// Levels by which a tile's cells change before it is sent out of turn.
-const URGENT_LEVELS: f64 = 64.0;
+/// Cells that became free, unknown or occupied before their tile is sent out of turn.
+const URGENT_CELLS: f64 = 24.0;
 /// The most that changes count, in rounds of age.
 const MOST_FOR_CHANGE: f64 = 4.0;
 /// What was not sent in this time is not saved up for later.
@@ -87,7 +87,7 @@ impl Updates {
             let age = tile.sent.map_or(MOST_FOR_CHANGE, |sent| {
                 ((now - sent).seconds() / self.round_s).max(0.0)
             });
-            let urgency = age + (f64::from(tile.change) / URGENT_LEVELS).min(MOST_FOR_CHANGE);
+            let urgency = age + (f64::from(tile.change) / URGENT_CELLS).min(MOST_FOR_CHANGE);
             if urgency >= 1.0 {
                 self.waiting.push(Candidate {
                     urgency,
@@ -137,9 +137,14 @@ mod tests {
         for n in 0..tiles {
             let tile = map.tile_mut([n % 8, n / 8]);
             tile.log_odds.fill(log_odds);
-            tile.note_change(4096, 1);
+            note(tile, 4096, 1);
         }
         map
+    }
+
+    fn note(tile: &mut Tile, cells: u32, revolution: u32) {
+        tile.change += cells;
+        tile.revision = revolution;
     }
 
     fn at(seconds: f64) -> Time {
@@ -150,9 +155,9 @@ mod tests {
     fn the_most_changed_tile_goes_first_and_a_quiet_one_waits_its_turn() {
         let (mut updates, mut map) = (updates(), map(3, 1000));
         assert_eq!(updates.choose(&mut map, at(0.0), [0.0; 2]).len(), 3);
-        map.tile_mut([2, 0]).note_change(300, 2);
-        map.tile_mut([1, 0]).note_change(200, 2);
-        map.tile_mut([0, 0]).note_change(3, 2);
+        note(map.tile_mut([2, 0]), 300, 2);
+        note(map.tile_mut([1, 0]), 200, 2);
+        note(map.tile_mut([0, 0]), 3, 2);
         assert_eq!(
             updates.choose(&mut map, at(0.1), [0.0; 2]),
             [[2, 0], [1, 0]]
@@ -169,7 +174,7 @@ mod tests {
             for n in 0..256 {
                 let tile = map.tile_mut([n % 8, n / 8]);
                 tile.log_odds[step as usize] = -2000;
-                tile.note_change(1000, step);
+                note(tile, 1000, step);
             }
             let now = at(0.1 * f64::from(step));
             let chosen = updates.choose(&mut map, now, [4.0; 2]).to_vec();
@@ -189,7 +194,7 @@ mod tests {
         for step in 0..200u32 {
             // Every other tile flickers all the time.
             for n in (0..300).step_by(2) {
-                map.tile_mut([n % 8, n / 8]).note_change(5000, step);
+                note(map.tile_mut([n % 8, n / 8]), 5000, step);
             }
             let now = at(0.1 * f64::from(step));
             for place in updates.choose(&mut map, now, [4.0, 4.0]) {
@@ -219,7 +224,7 @@ mod tests {
         }
         encode(tile, 65_000);
         let full = tile.encoded.len();
-        tile.note_change(1, 2);
+        note(tile, 1, 2);
         encode(tile, 1400);
         assert!(
             full > 1400 && tile.encoded.len() < 1400,

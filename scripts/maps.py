@@ -1,0 +1,176 @@
+"""Compares the occupancy grid, as a subscriber receives it, with the simulator's truth."""
+
+import collections
+import json
+import math
+import pathlib
+import struct
+import types
+
+import numpy as np
+from scipy.ndimage import binary_dilation, distance_transform_edt
+
+from clouds import fields
+from tiles import UNKNOWN, levels
+
+OBJECT_LIST, GRID_TILE = 2021, 2022
+OCCUPIED, SEEN, PASSED = 1, 2, 4
+MOVING_MPS = 0.5
+LATE_JOIN_S = 10
+REACH_M = 50
+
+
+def unzigzag(value):
+    return (value >> 1) ^ -(value & 1)
+
+
+def revolutions(recording):
+    """For each object list of a recording, the tiles that follow it and the bytes that they take."""
+    at, tiles, size = 0, None, 0
+    while at + 5 <= len(recording):
+        length = struct.unpack("<I", recording[at + 1 : at + 5])[0] >> 8
+        envelope = dict(fields(recording[at + 5 : at + 5 + length]))
+        at += 5 + length
+        kind = unzigzag(envelope[1])
+        if kind == OBJECT_LIST:
+            if tiles is not None:
+                yield tiles, size
+            tiles, size = [], 0
+        elif kind == GRID_TILE and tiles is not None:
+            size += 5 + length
+            field = dict(fields(envelope[2]))
+            place = (unzigzag(field[4]), unzigzag(field[5]))
+            tiles.append((place, types.SimpleNamespace(cellsPerSide=field[6], cellSize=field[7], cells=field[10])))
+    yield tiles, size
+
+
+def within(boxes, x, y, margin):
+    """Which places lie in one of the boxes."""
+    inside = np.zeros(np.shape(x), bool)
+    for user in boxes:
+        dx, dy = x - user["x"], y - user["y"]
+        cosine, sine = math.cos(user["yaw"]), math.sin(user["yaw"])
+        along, across = np.abs(dx * cosine + dy * sine), np.abs(dy * cosine - dx * sine)
+        inside |= (along <= user["l"] / 2 + margin) & (across <= user["w"] / 2 + margin)
+    return inside
+
+
+def static_scores(grid_path, true_path, truth):
+    """Recall, precision and free space in percent within 10 and 50 m of the vehicle's path."""
+    with np.load(grid_path) as grid, np.load(true_path) as true:
+        cell = float(grid["cell"])
+        found, bits, origin = grid["probability"], true["cells"], true["origin"]
+        shift = np.round((grid["origin"] - origin) / cell).astype(int)
+    low = np.maximum(shift, 0)
+    high = np.minimum(bits.shape[::-1], shift + found.shape[::-1])
+    found = found[low[1] - shift[1] : high[1] - shift[1], low[0] - shift[0] : high[0] - shift[0]]
+    bits, origin = bits[low[1] : high[1], low[0] : high[0]], origin + low * cell
+    off_path = np.ones(found.shape, bool)
+    for line in truth:
+        column, row = (int((line["ego"][axis] - origin[n]) / cell) for n, axis in enumerate("xy"))
+        if 0 <= row < off_path.shape[0] and 0 <= column < off_path.shape[1]:
+            off_path[row, column] = False
+    distance = distance_transform_edt(off_path) * cell
+    tolerant = lambda cells: binary_dilation(cells, np.ones((3, 3), bool))
+    stands, occupied = bits & OCCUPIED > 0, found > 0.5
+    near_standing = tolerant(stands)
+    scores = {}
+    for reach in [10, 50]:
+        near = distance <= reach
+        wanted, got = stands & (bits & SEEN > 0) & near, occupied & near
+        free = (bits & PASSED > 0) & ~near_standing & near
+        scores[f"occupied cells found within {reach} m, %"] = 100 * np.mean(tolerant(occupied)[wanted])
+        scores[f"occupied cells right within {reach} m, %"] = 100 * np.mean(near_standing[got])
+        scores[f"free cells found within {reach} m, %"] = 100 * np.mean(found[free] < 0.5)
+    return scores
+
+
+class Subscriber:
+    """Keeps the map that the tiles make."""
+
+    def __init__(self):
+        self.tiles, self.side, self.cell = {}, 64, 0.1
+
+    def take(self, tiles):
+        for place, tile in tiles:
+            cells = np.array(levels(tile), np.int8)
+            self.side, self.cell = tile.cellsPerSide, tile.cellSize
+            self.tiles[place] = cells.reshape(self.side, self.side) - UNKNOWN
+
+    def occupied(self, columns, rows):
+        out = np.zeros(len(columns), bool)
+        for n, (column, row) in enumerate(zip(columns, rows)):
+            tile = self.tiles.get((column // self.side, row // self.side))
+            out[n] = tile is not None and tile[row % self.side, column % self.side] > 0
+        return out
+
+    def near(self, x, y):
+        """Tiles whose middle lies within the grid's reach."""
+        width = self.side * self.cell
+        return {
+            place
+            for place in self.tiles
+            if math.hypot((place[0] + 0.5) * width - x, (place[1] + 0.5) * width - y) < REACH_M
+        }
+
+
+def stream_scores(recording, truth, true_path):
+    """What a subscriber sees: trails, bytes a second, and how soon a late one has the map."""
+    with np.load(true_path) as true:
+        bits, origin, cell = true["cells"], true["origin"], float(true["cell"])
+    everyone, late = Subscriber(), Subscriber()
+    sizes, left, marked, joined = [], 0, 0, math.nan
+    for number, (tiles, size) in enumerate(revolutions(pathlib.Path(recording).read_bytes())):
+        everyone.take(tiles)
+        sizes.append(size)
+        users = truth[number]["objects"]
+        if number > 20 and number % 3 == 0:
+            for user in truth[number - 10]["objects"]:
+                if abs(user["v"]) < MOVING_MPS or user["points"] < 5:
+                    continue
+                radius = user["l"] / 2
+                columns, rows = np.meshgrid(
+                    *(np.arange(int((user[a] - radius) / cell), int((user[a] + radius) / cell) + 1) for a in "xy")
+                )
+                columns, rows = columns.ravel(), rows.ravel()
+                x, y = (columns + 0.5) * cell, (rows + 0.5) * cell
+                column = ((x - origin[0]) / cell).astype(int).clip(0, bits.shape[1] - 1)
+                row = ((y - origin[1]) / cell).astype(int).clip(0, bits.shape[0] - 1)
+                over = within([user], x, y, 0) & ~within(users, x, y, 0.3) & (bits[row, column] & OCCUPIED == 0)
+                left += np.sum(over)
+                marked += np.sum(everyone.occupied(columns[over], rows[over]))
+        if number >= 10 * LATE_JOIN_S and math.isnan(joined):
+            ego = truth[number]["ego"]
+            late.take(tiles)
+            if everyone.near(ego["x"], ego["y"]) <= set(late.tiles):
+                joined = (number - 10 * LATE_JOIN_S + 1) / 10
+    return {
+        "cells of a moving object's way occupied 1 s later, %": 100 * marked / max(left, 1),
+        "late subscriber has the whole map after, s": joined,
+        "kB/s of tiles": np.mean(sizes[10:]) / 100,
+    }
+
+
+def scores(run, folder, scenario, seed, duration, config):
+    """All scores of one scenario and seed."""
+    stem = folder / f"map-{scenario}-{seed}"
+    rec, truth, true = (stem.with_suffix(s) for s in [".rec", ".truth.jsonl", ".true.npz"])
+    out, grid = stem.with_suffix(".out.rec"), stem.with_suffix(".npz")
+    simulated = ["simulate", scenario, "--seed", seed, "--duration", duration]
+    run(*simulated, "--output", rec, "--truth", truth, "--grid", true)
+    run("process", rec, "--output", out, "--grid", grid, "--config", config)
+    with open(truth) as file:
+        lines = [json.loads(line) for line in file]
+    result = static_scores(grid, true, lines) | stream_scores(out, lines, true)
+    for path in [rec, out]:
+        path.unlink()
+    return result
+
+
+def mean_by_name(results):
+    """Means of every score over several results."""
+    values = collections.defaultdict(list)
+    for result in results:
+        for name, value in result.items():
+            values[name].append(value)
+    return {name: float(np.mean(of)) for name, of in values.items()}
