@@ -15,6 +15,7 @@ use kreisel::cloud::{Intake, Scan};
 use kreisel::cluster::Dbscan;
 use kreisel::config::Configuration;
 use kreisel::ego::Sweep;
+use kreisel::grid::{Grid, Perceived};
 use kreisel::ground::Ground;
 use kreisel::pipeline::{Outcome, Pipeline};
 use kreisel::simulate::{Simulation, scenario};
@@ -178,6 +179,25 @@ fn bench(name: &str, frames: &[Vec<u8>], rounds: usize, unit_us: f64) {
             );
         }),
     );
+
+    for reach_m in [10.0, 50.0] {
+        let mut parameters = configuration.grid.clone();
+        parameters.reach_m = reach_m;
+        let mut grid = Grid::new(&parameters);
+        row(
+            &format!("grid {reach_m} m"),
+            measure(rounds, |_| {
+                grid.process(&Perceived {
+                    scan: black_box(&scan),
+                    ground: ground.mask(),
+                    heights_m: ground.heights_m(),
+                    plane: &report.plane,
+                    objects: tracker.objects(),
+                    sweep: &sweep,
+                });
+            }),
+        );
+    }
 
     let inputs: Vec<Vec<u8>> = (0..rounds)
         .map(|round| {

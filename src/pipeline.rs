@@ -4,7 +4,7 @@ use crate::cloud::{Dialect, Intake, Refusal, Revolution, Scan};
 use crate::cluster::Dbscan;
 use crate::config::Configuration;
 use crate::ego::{Ego, Heard, Pose, Sweep};
-use crate::grid::Grid;
+use crate::grid::{Grid, Perceived};
 use crate::ground::{Ground, GroundReport, Origin};
 use crate::publish::{Heading, Publisher};
 use crate::tally::Tally;
@@ -235,14 +235,14 @@ impl Pipeline {
         let objects = self
             .tracker
             .process(&self.scan, clusters, heights_m, &ground, &sweep);
-        self.grid.process(
-            &self.scan,
-            self.ground.mask(),
+        self.grid.process(&Perceived {
+            scan: &self.scan,
+            ground: self.ground.mask(),
             heights_m,
-            &ground.plane,
+            plane: &ground.plane,
             objects,
-            &sweep,
-        );
+            sweep: &sweep,
+        });
 
         let report = RevolutionReport {
             number: self.last.map_or(0, |last| last.number.wrapping_add(1)),

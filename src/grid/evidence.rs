@@ -1,40 +1,39 @@
 //! From three dimensions to two: what the rays of a column say of the cells below them.
 
-use super::GridParameters;
-use super::NoReturn;
-use super::intervals::Intervals;
+use super::{GridParameters, NoReturn};
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::ground::Plane;
 
-/// One ray from the side: its height above the ground changes linearly with the horizontal
-/// distance from the sensor.
-#[derive(Debug, Clone, Copy, Default)]
-struct Ray {
-    /// How far it is known to go.
-    end_m: f32,
-    /// Change of its height for each metre.
-    rise: f32,
-    /// Whether it ends on the ground, so that its height is known along all of its way.
-    lands: bool,
-}
-
-/// The rays of a revolution over the ground.
+/// The rays of a revolution over the ground, by columns and layers. From the side a ray is
+/// straight: its height above the ground changes evenly with the horizontal distance.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Evidence {
     /// Height of the sensor.
     sensor_m: f32,
-    rays: Vec<Ray>,
-    /// Distance of every return that is an obstacle, and of the nearest one of every column.
-    obstacles_m: Vec<f32>,
+    /// How far each ray is known to go.
+    ends_m: Vec<[f32; MAX_LAYERS]>,
+    /// Change of its height for each metre.
+    rises: Vec<[f32; MAX_LAYERS]>,
+    /// Distance of every return, and of every one that is an obstacle.
+    returns_m: Vec<[f32; MAX_LAYERS]>,
+    obstacles_m: Vec<[f32; MAX_LAYERS]>,
+    /// Of a column's nearest obstacle.
     nearest_m: Vec<f32>,
 }
 
-/// There is no obstacle.
-const NONE_M: f32 = f32::MAX;
+/// A stretch of a column's way, seen from above.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Stretch {
+    pub(super) column: usize,
+    pub(super) from_m: f32,
+    pub(super) to_m: f32,
+}
+
+/// There is nothing.
+pub(super) const NONE_M: f32 = f32::MAX;
 /// Columns to either side in which a surface is looked for that a ray may have missed: one that
 /// was lost on it, or one that found a gap between leaves.
 const BESIDE: usize = 2;
-
 /// How far before a return its ray is known to be free: returns scatter along the ray.
 const BEFORE_RETURN_M: f32 = 0.05;
 /// How unsure the height of a ray that does not land is for each metre of distance: the tilt of
@@ -51,144 +50,230 @@ impl Evidence {
         heights_m: &[f32],
         parameters: &GridParameters,
     ) {
-        self.find_obstacles(scan, ground, heights_m, parameters);
         self.sensor_m = plane.height_m() as f32;
-        let normal = plane.normal().map(|part| part as f32);
+        let (low_m, high_m) = (parameters.obstacle_low_m, parameters.obstacle_high_m);
+        let (low_m, high_m) = (low_m as f32, high_m as f32);
         let no_return_m = match parameters.no_return {
             NoReturn::Clear => parameters.reach_m,
             NoReturn::Limit => parameters.no_return_limit_m,
             NoReturn::Ignore => 0.0,
         } as f32;
-        self.rays.clear();
-        for column in 0..scan.columns() {
+        let normal = plane.normal().map(|part| part as f32);
+        let slopes: [_; MAX_LAYERS] = std::array::from_fn(|layer| scan.slope(layer));
+        let tangents = slopes.map(|(tangent, _)| tangent as f32);
+        let cosines = slopes.map(|(_, cosine)| cosine as f32);
+        for rays in [
+            &mut self.ends_m,
+            &mut self.rises,
+            &mut self.returns_m,
+            &mut self.obstacles_m,
+        ] {
+            rays.clear();
+        }
+        self.nearest_m.clear();
+        let ranges_m = scan.range_m().as_chunks::<MAX_LAYERS>().0;
+        let heights_m = heights_m.as_chunks::<MAX_LAYERS>().0;
+        let ground = ground.as_chunks::<MAX_LAYERS>().0;
+        for (column, ranges_m) in ranges_m.iter().enumerate() {
             let [sine, cosine] = scan.direction(column);
             let level = normal[0] * sine + normal[1] * cosine;
+            let mut rises = [0.0; MAX_LAYERS];
+            let mut ends_m = [0.0; MAX_LAYERS];
+            let mut returns_m = [NONE_M; MAX_LAYERS];
+            let mut obstacles_m = [NONE_M; MAX_LAYERS];
             for layer in 0..MAX_LAYERS {
-                let point = scan.index(column, layer);
-                let range_m = scan.range_m()[point];
-                self.rays.push(if range_m > 0.0 {
-                    let distance_m = scan.distance_m(point);
-                    Ray {
-                        end_m: distance_m,
-                        rise: (heights_m[point] - self.sensor_m) / distance_m,
-                        lands: ground[point],
-                    }
-                } else if range_m < 0.0 {
-                    Ray::default()
+                let (range_m, height_m) = (ranges_m[layer], heights_m[column][layer]);
+                let has_return = range_m > 0.0;
+                let distance_m = range_m * cosines[layer];
+                let by_return = (height_m - self.sensor_m) / distance_m;
+                let by_plane = level + normal[2] * tangents[layer];
+                let lands_m = if by_plane < 0.0 {
+                    -self.sensor_m / by_plane
                 } else {
-                    let rise = level + normal[2] * scan.slope(layer).0 as f32;
-                    let ground_m = -self.sensor_m / rise;
-                    let falls = rise < 0.0 && ground_m < no_return_m;
-                    let end_m = if falls { ground_m } else { no_return_m };
-                    Ray {
-                        end_m: end_m.min(nearest_beside_m(scan, column, layer)),
-                        rise,
-                        lands: false,
-                    }
-                });
+                    NONE_M
+                };
+                let unseen_m = if range_m == 0.0 {
+                    least(lands_m, no_return_m)
+                } else {
+                    0.0
+                };
+                let is_obstacle = has_return
+                    & !ground[column][layer]
+                    & (height_m >= low_m)
+                    & (height_m <= high_m);
+                rises[layer] = if has_return { by_return } else { by_plane };
+                ends_m[layer] = if has_return {
+                    distance_m - BEFORE_RETURN_M
+                } else {
+                    unseen_m
+                };
+                returns_m[layer] = if has_return { distance_m } else { NONE_M };
+                obstacles_m[layer] = if is_obstacle { distance_m } else { NONE_M };
             }
+            self.rises.push(rises);
+            self.ends_m.push(ends_m);
+            self.returns_m.push(returns_m);
+            self.obstacles_m.push(obstacles_m);
+            self.nearest_m
+                .push(obstacles_m.into_iter().fold(NONE_M, least));
         }
     }
 
-    /// Finds the returns that stand on the ground within the heights of obstacles.
-    fn find_obstacles(
-        &mut self,
-        scan: &Scan,
-        ground: &[bool],
-        heights_m: &[f32],
-        parameters: &GridParameters,
-    ) {
-        let low_m = parameters.obstacle_low_m as f32;
-        let high_m = parameters.obstacle_high_m as f32;
-        let heights = low_m..=high_m;
-        self.obstacles_m.clear();
-        self.obstacles_m.extend((0..scan.len()).map(|point| {
-            let is_obstacle =
-                scan.has_return(point) && !ground[point] && heights.contains(&heights_m[point]);
-            if is_obstacle {
-                scan.distance_m(point)
-            } else {
-                NONE_M
-            }
-        }));
-        self.nearest_m.clear();
-        let columns = self.obstacles_m.chunks_exact(MAX_LAYERS);
-        self.nearest_m
-            .extend(columns.map(|layers| layers.iter().copied().fold(NONE_M, f32::min)));
-    }
-
-    /// Distance of a return, if it is an obstacle.
-    pub(super) fn obstacle_m(&self, point: usize) -> Option<f32> {
-        Some(self.obstacles_m[point]).filter(|distance_m| *distance_m < NONE_M)
+    /// Distances of a column's obstacles, by layers; [`NONE_M`] where there is none.
+    pub(super) fn obstacles_m(&self, column: usize) -> &[f32; MAX_LAYERS] {
+        &self.obstacles_m[column]
     }
 
     /// Where a column's rays are known to have passed low enough to say that nothing is there:
-    /// before the first obstacle below the height of what hangs over the road; behind it only
-    /// where they went over it and come down to the ground again.
+    /// around the sensor, and before the first obstacle where a ray is below the height of what
+    /// hangs over the road; behind it only where one came over it and down to the ground again.
     pub(super) fn passed(
         &self,
         column: usize,
-        scan: &Scan,
         parameters: &GridParameters,
-    ) -> Intervals {
+        passed: &mut Vec<Stretch>,
+    ) {
         let reach_m = parameters.reach_m as f32;
-        let nearest_m = beside(column, scan.columns())
-            .map(|column| self.nearest_m[column])
-            .fold(reach_m, f32::min);
-        let mut passed = Intervals::default();
-        passed.add(0.0, parameters.nearest_m as f32);
-        // Of the obstacles that higher rays met: this one goes on under them.
-        let mut roof_m = reach_m;
-        for layer in (0..MAX_LAYERS).rev() {
-            let point = scan.index(column, layer);
-            let ray = self.rays[point];
-            let end_m = ray.end_m - BEFORE_RETURN_M;
-            let (from_m, to_m) = self.below(&ray, parameters.obstacle_high_m as f32);
-            passed.add(from_m, to_m.min(end_m).min(nearest_m));
-            if scan.has_return(point) {
-                let (from_m, to_m) = self.below(&ray, parameters.low_pass_m as f32);
-                passed.add(from_m, to_m.min(end_m).min(roof_m));
+        let (mut nearest_m, mut beside_m) = (reach_m, [NONE_M; MAX_LAYERS]);
+        for column in beside(column, self.nearest_m.len()) {
+            nearest_m = least(nearest_m, self.nearest_m[column]);
+            for (beside_m, return_m) in beside_m.iter_mut().zip(&self.returns_m[column]) {
+                *beside_m = least(*beside_m, *return_m);
             }
-            roof_m = roof_m.min(self.obstacles_m[point]);
         }
-        passed
-    }
-
-    /// Distances between which a ray is lower than a height.
-    fn below(&self, ray: &Ray, height_m: f32) -> (f32, f32) {
-        let until_m = height_m - self.sensor_m;
-        if ray.rise < 0.0 {
-            ((until_m / ray.rise).max(0.0), f32::MAX)
-        } else if until_m <= 0.0 {
-            (0.0, 0.0)
+        let (returns_m, ends_m) = (&self.returns_m[column], &self.ends_m[column]);
+        let (from_m, below_m) = self.below(column, parameters.obstacle_high_m as f32);
+        let mut to_m = [0.0; MAX_LAYERS];
+        for layer in 0..MAX_LAYERS {
+            // A single ray that is lost on a surface does not go through it.
+            let has_return = returns_m[layer] < NONE_M;
+            let before_m = if has_return { NONE_M } else { beside_m[layer] };
+            let end_m = least(least(ends_m[layer], before_m), nearest_m);
+            to_m[layer] = least(end_m, below_m[layer]);
+        }
+        let mut stretches = Stretches::new(column, parameters.nearest_m as f32, passed);
+        if from_m == [0.0; MAX_LAYERS] {
+            stretches.add(0.0, to_m.into_iter().fold(0.0, f32::max));
         } else {
-            (0.0, until_m / ray.rise.max(1e-6))
+            for (from_m, to_m) in from_m.into_iter().zip(to_m) {
+                stretches.add(from_m, to_m);
+            }
+        }
+        if nearest_m < reach_m {
+            let (from_m, below_m) = self.below(column, parameters.low_pass_m as f32);
+            // A ray below an obstacle that higher rays met goes on under it.
+            let mut roof_m = reach_m;
+            for layer in (0..MAX_LAYERS).rev() {
+                if returns_m[layer] < NONE_M {
+                    let end_m = ends_m[layer].min(below_m[layer]).min(roof_m);
+                    stretches.add(from_m[layer].max(nearest_m), end_m);
+                }
+                roof_m = roof_m.min(self.obstacles_m[column][layer]);
+            }
         }
     }
 
-    /// Height below which a column's lowest ray that goes on beyond a distance is at least.
-    pub(super) fn lowest_pass_m(&self, column: usize, distance_m: f32) -> f32 {
-        let rays = &self.rays[column * MAX_LAYERS..(column + 1) * MAX_LAYERS];
-        let beyond = rays.iter().filter(|ray| ray.end_m > distance_m);
-        beyond
-            .map(|ray| {
-                let unsure_per_m = if ray.lands { 0.0 } else { UNSURE_PER_M };
-                self.sensor_m + (ray.rise + unsure_per_m) * distance_m
+    /// Distances between which each ray of a column is lower than a height.
+    fn below(&self, column: usize, height_m: f32) -> ([f32; MAX_LAYERS], [f32; MAX_LAYERS]) {
+        let until_m = height_m - self.sensor_m;
+        let (mut from_m, mut to_m) = ([0.0; MAX_LAYERS], [0.0; MAX_LAYERS]);
+        for (layer, rise) in self.rises[column].into_iter().enumerate() {
+            let at_m = until_m / rise;
+            let falls = rise < 0.0;
+            from_m[layer] = if falls & (at_m > 0.0) { at_m } else { 0.0 };
+            let rises_to_m = if at_m > 0.0 { at_m } else { 0.0 };
+            to_m[layer] = if falls { NONE_M } else { rises_to_m };
+        }
+        (from_m, to_m)
+    }
+
+    /// Height below which the lowest of a column's rays that go on beyond a distance is, as far
+    /// as that is known. A ray that lands has a known height all along.
+    pub(super) fn lowest_pass_m(&self, column: usize, distance_m: f32, ground: &[bool]) -> f32 {
+        let ground = &ground[column * MAX_LAYERS..];
+        let rays = self.ends_m[column]
+            .iter()
+            .zip(&self.rises[column])
+            .zip(ground);
+        rays.filter(|((end_m, _), _)| **end_m > distance_m)
+            .map(|((_, rise), lands)| {
+                let unsure_per_m = if *lands { 0.0 } else { UNSURE_PER_M };
+                self.sensor_m + (rise + unsure_per_m) * distance_m
             })
             .fold(f32::MAX, f32::min)
     }
 }
 
-/// A column and those close beside it, over the seam where the sweep begins.
-fn beside(column: usize, columns: usize) -> impl Iterator<Item = usize> {
-    (columns - BESIDE.min(columns)..=columns + BESIDE).map(move |at| (column + at) % columns)
+/// The lesser of two numbers, of which none is NaN.
+fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
-/// Distance of the nearest return in a layer close beside a column.
-fn nearest_beside_m(scan: &Scan, column: usize, layer: usize) -> f32 {
-    let points = beside(column, scan.columns()).map(|column| scan.index(column, layer));
-    points
-        .filter(|point| scan.has_return(*point))
-        .map(|point| scan.distance_m(point))
-        .fold(NONE_M, f32::min)
+/// Collects what one column's rays passed. They come in the order of their layers, the lowest
+/// first, and so, nearly, in that of their beginnings: what meets the stretch before joins it.
+struct Stretches<'a> {
+    passed: &'a mut Vec<Stretch>,
+}
+
+impl<'a> Stretches<'a> {
+    /// With the stretch around the sensor.
+    fn new(column: usize, nearest_m: f32, passed: &'a mut Vec<Stretch>) -> Self {
+        passed.push(Stretch {
+            column,
+            from_m: 0.0,
+            to_m: nearest_m,
+        });
+        Self { passed }
+    }
+
+    fn add(&mut self, from_m: f32, to_m: f32) {
+        if from_m >= to_m {
+            return;
+        }
+        let Some(last) = self.passed.last_mut() else {
+            return;
+        };
+        if from_m > last.to_m || to_m < last.from_m {
+            let column = last.column;
+            self.passed.push(Stretch {
+                column,
+                from_m,
+                to_m,
+            });
+        } else {
+            last.from_m = last.from_m.min(from_m);
+            last.to_m = last.to_m.max(to_m);
+        }
+    }
+}
+
+/// A column and those close beside it, over the seam where the sweep begins.
+fn beside(column: usize, columns: usize) -> impl Iterator<Item = usize> {
+    let wrapped = move |at: usize| if at < columns { at } else { at - columns };
+    let first = column + columns - BESIDE.min(columns);
+    (first..=first + 2 * BESIDE.min(columns)).map(move |at| wrapped(wrapped(at)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stretches_that_meet_become_one() {
+        let mut passed = vec![];
+        let mut stretches = Stretches::new(3, 1.0, &mut passed);
+        for (from_m, to_m) in [(0.5, 2.0), (2.0, 4.0), (3.0, 3.0), (5.0, 6.0), (5.5, 7.0)] {
+            stretches.add(from_m, to_m);
+        }
+        let ends: Vec<_> = passed.iter().map(|at| (at.from_m, at.to_m)).collect();
+        assert_eq!(ends, [(0.0, 4.0), (5.0, 7.0)]);
+        assert!(passed.iter().all(|stretch| stretch.column == 3));
+    }
+
+    #[test]
+    fn columns_beside_the_seam_are_on_either_side_of_it() {
+        assert_eq!(beside(0, 10).collect::<Vec<_>>(), [8, 9, 0, 1, 2]);
+        assert_eq!(beside(9, 10).collect::<Vec<_>>(), [7, 8, 9, 0, 1]);
+        assert!(beside(0, 1).all(|column| column == 0));
+    }
 }

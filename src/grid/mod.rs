@@ -1,17 +1,22 @@
 //! The occupancy grid: what of the world is static, and what of it is free.
 //!
-//! `evidence` says what the rays of a column mean on the ground, `window` collects it for the
-//! cells around the sensor so that each counts once, `model` turns it into log-odds, `map` keeps
-//! them in tiles, `updates` chooses the tiles to send. Moving road users are left to the
-//! objects: together the two are the hybrid model that Chen 2021 names in section 2.1.4.
+//! `evidence` says what the rays of a column mean on the ground, `casting` draws them into the
+//! `window` of cells around the sensor, where each counts once, `model` and `filter` turn that
+//! into log-odds, `map` keeps them in tiles, `updates` chooses the tiles to send. Road users that
+//! move (`moving`) are left to the objects: together the two are the hybrid model that Chen 2021
+//! names in section 2.1.4.
+
+mod casting;
 
 mod evidence;
 
-mod intervals;
+mod filter;
 
 mod map;
 
 pub mod model;
+
+mod moving;
 
 mod updates;
 
@@ -19,16 +24,17 @@ mod window;
 
 pub use map::{Map, TILE_CELLS, Tile};
 
-use crate::cloud::{CAPACITY, MAX_LAYERS, Scan};
+use crate::cloud::{CAPACITY, Scan};
 use crate::ego::{Placement, Sweep};
 use crate::ground::Plane;
 use crate::parameter::{choices, parameters};
 use crate::time::Time;
 use crate::track::Object;
 use crate::wire::grid_tile::GridTile;
-use evidence::Evidence;
+use casting::Casting;
+use evidence::{Evidence, Stretch};
+use filter::{Filter, View};
 use map::HEIGHT_UNIT_M;
-use model::{InverseSensorModel, in_units, log_odds};
 use updates::Updates;
 use window::{Cell, Window};
 
@@ -105,61 +111,63 @@ parameters! {
 #[derive(Debug, Clone)]
 pub struct Grid {
     parameters: GridParameters,
-    /// Log-odds of a passed cell by its distance from the sensor in cells.
-    passed: Vec<i16>,
-    hit: i16,
-    lowest: i16,
-    highest: i16,
+    filter: Filter,
     map: Map,
     map_id: u32,
     epoch: Option<u32>,
+    /// Counts the revolutions of the map.
     revolution: u32,
+    updates: Updates,
     window: Window,
     evidence: Evidence,
+    casting: Casting,
+    placements: Vec<Placement>,
+    passed: Vec<Stretch>,
+    /// Cells in which rays ended, and how high.
+    hits: Vec<(Cell, u8)>,
     /// Returns on road users that move.
     is_moving: Vec<bool>,
-    hits: Vec<(Cell, u8)>,
-    placements: Vec<Placement>,
-    updates: Updates,
 }
 
-/// How far below the top of what was seen in a cell a ray must pass to say that it is gone, and
-/// below which share of its height: windows let rays through, doors do not.
-const BELOW_TOP_M: f32 = 0.15;
-const BELOW_SHARE: f32 = 0.6;
-/// Time from its first sight within which a road user that moves may have marked the map before
-/// it was known to move.
-const UNKNOWN_S: f64 = 1.5;
+/// A revolution as the steps before left it.
+#[derive(Debug, Clone, Copy)]
+pub struct Perceived<'a> {
+    /// Its points.
+    pub scan: &'a Scan,
+    /// Which of them are ground.
+    pub ground: &'a [bool],
+    /// Their heights above it.
+    pub heights_m: &'a [f32],
+    /// The ground around the sensor.
+    pub plane: &'a Plane,
+    /// Road users, where they are at the end of the sweep.
+    pub objects: &'a [Object],
+    /// Where the sensor was.
+    pub sweep: &'a Sweep,
+}
 
 impl Grid {
     /// A grid that has seen nothing.
     pub fn new(parameters: &GridParameters) -> Self {
-        let model = InverseSensorModel::new(parameters);
-        let cell_m = parameters.cell_m;
-        let reach_cells = (parameters.reach_m / cell_m) as usize + 2 * TILE_CELLS;
-        let units = |probability: f64| in_units(log_odds(probability));
-        let tile_m = cell_m * TILE_CELLS as f64;
+        let tile_m = parameters.cell_m * TILE_CELLS as f64;
         let tiles_within = |metres: f64| (2.0 * metres / tile_m) as usize;
         // The sensor moves during a sweep, and stands anywhere in its tile.
         let window_side = tiles_within(parameters.reach_m) + 4;
         let map_side = tiles_within(parameters.keep_m).max(window_side) + 2;
         Self {
-            passed: (0..2 * reach_cells)
-                .map(|cells| units(model.passed((cells as f64 + 0.5) * cell_m)))
-                .collect(),
-            hit: units(model.hit()),
-            lowest: units(parameters.lowest_probability),
-            highest: units(parameters.highest_probability),
+            filter: Filter::new(parameters),
             map: Map::new(map_side),
             map_id: 0,
             epoch: None,
             revolution: 0,
+            updates: Updates::new(parameters),
             window: Window::new(window_side),
             evidence: Evidence::default(),
-            is_moving: Vec::with_capacity(CAPACITY),
-            hits: Vec::with_capacity(CAPACITY),
+            casting: Casting::default(),
             placements: vec![],
-            updates: Updates::new(parameters),
+            passed: vec![],
+            hits: Vec::with_capacity(CAPACITY),
+            is_moving: Vec::with_capacity(CAPACITY),
             parameters: parameters.clone(),
         }
     }
@@ -174,7 +182,7 @@ impl Grid {
         &self.map
     }
 
-    /// Tells maps apart: another one begins with the session, with a jump of the poses and of
+    /// Tells maps apart: another one begins with the session, and with a jump of the poses or of
     /// time.
     pub fn map_id(&self) -> u32 {
         self.map_id
@@ -185,9 +193,129 @@ impl Grid {
         self.parameters.cell_m
     }
 
-    /// Whether a map is kept.
-    pub fn is_enabled(&self) -> bool {
-        self.parameters.enabled
+    /// Takes a revolution in.
+    pub fn process(&mut self, perceived: &Perceived<'_>) {
+        if !self.parameters.enabled {
+            return;
+        }
+        let Perceived {
+            scan,
+            ground,
+            heights_m,
+            plane,
+            sweep,
+            ..
+        } = *perceived;
+        self.begin_map(sweep, scan.time());
+        self.revolution += 1;
+        let sensor = sweep.sensor.placement();
+        let tile_m = self.parameters.cell_m * TILE_CELLS as f64;
+        let home = sensor
+            .origin_m()
+            .map(|metres| libm::floor(metres / tile_m) as i32);
+        self.map.keep_around(home);
+        let half = (self.window.side() / 2) as i32;
+        self.window.begin(home.map(|tile| tile - half));
+        sweep.placements(scan.columns(), &mut self.placements);
+        self.evidence
+            .begin(scan, plane, ground, heights_m, &self.parameters);
+        self.mark_returns(perceived);
+        self.mark_passed(scan);
+        let view = View {
+            scan,
+            ground,
+            evidence: &self.evidence,
+            sensor,
+            revolution: self.revolution,
+        };
+        self.filter.free(&self.window, &view, &mut self.map);
+        self.filter
+            .occupy(&self.hits, &mut self.window, self.revolution, &mut self.map);
+        let cell_m = self.parameters.cell_m;
+        for object in perceived.objects {
+            if moving::moves(object, &self.parameters) {
+                moving::clear_way(object, scan.time(), &mut self.map, cell_m, self.revolution);
+            }
+        }
+    }
+
+    /// A new map where positions before and after cannot be compared.
+    fn begin_map(&mut self, sweep: &Sweep, time: Time) {
+        if self.epoch == Some(sweep.epoch) {
+            return;
+        }
+        self.epoch = Some(sweep.epoch);
+        self.map.clear();
+        self.revolution = 0;
+        // Other runs of the service began at other times.
+        let from_time = (time.micros() / 10_000) as u32;
+        self.map_id = if from_time == self.map_id {
+            from_time.wrapping_add(1)
+        } else {
+            from_time
+        };
+    }
+
+    /// Marks the cells in which rays ended on obstacles that do not move.
+    fn mark_returns(&mut self, perceived: &Perceived<'_>) {
+        let Perceived {
+            scan,
+            objects,
+            sweep,
+            ..
+        } = *perceived;
+        self.is_moving.clear();
+        self.is_moving.resize(scan.len(), false);
+        let moving = objects
+            .iter()
+            .filter(|object| moving::moves(object, &self.parameters));
+        for object in moving {
+            let margin_m = self.parameters.moving_margin_m;
+            let placements = &self.placements;
+            moving::mark_returns(
+                object,
+                scan,
+                sweep,
+                placements,
+                margin_m,
+                &mut self.is_moving,
+            );
+        }
+        self.hits.clear();
+        let (per_cell, corner) = (1.0 / self.parameters.cell_m, self.window.corner());
+        let reach_m = self.parameters.reach_m as f32;
+        for column in 0..scan.columns() {
+            let obstacles_m = self.evidence.obstacles_m(column);
+            for (layer, distance_m) in obstacles_m.iter().enumerate() {
+                let point = scan.index(column, layer);
+                if *distance_m > reach_m || self.is_moving[point] {
+                    continue;
+                }
+                let [x, y, _] = scan.point_m(point).map(f64::from);
+                let at_m = self.placements[column].local_m([x, y]);
+                let cells = [0, 1].map(|axis| at_m[axis] * per_cell - corner[axis]);
+                if let Some(cell) = self.window.hit(cells) {
+                    let top = (perceived.heights_m[point] / HEIGHT_UNIT_M) as u8;
+                    self.hits.push((cell, top));
+                }
+            }
+        }
+    }
+
+    /// Marks the cells that rays passed.
+    fn mark_passed(&mut self, scan: &Scan) {
+        self.passed.clear();
+        for column in 0..scan.columns() {
+            self.evidence
+                .passed(column, &self.parameters, &mut self.passed);
+        }
+        self.casting.cast(
+            &self.passed,
+            scan,
+            &self.placements,
+            self.parameters.cell_m,
+            &mut self.window,
+        );
     }
 
     /// Hands the tiles that are to be sent at a time to `send`, the most urgent first.
@@ -215,257 +343,6 @@ impl Grid {
             let message = message.with_cells(std::mem::take(&mut tile.encoded));
             send(&message);
             tile.encoded = message.cells.0;
-        }
-    }
-
-    /// Takes a revolution in: its points, which of them are `ground`, their heights above it,
-    /// and the road users, whose places are valid at the end of the sweep.
-    pub fn process(
-        &mut self,
-        scan: &Scan,
-        ground: &[bool],
-        heights_m: &[f32],
-        plane: &Plane,
-        objects: &[Object],
-        sweep: &Sweep,
-    ) {
-        if !self.parameters.enabled {
-            return;
-        }
-        self.begin_map(sweep, scan.time());
-        self.revolution += 1;
-        let sensor = sweep.sensor.placement().origin_m();
-        let tile_m = self.parameters.cell_m * TILE_CELLS as f64;
-        let tile_of = |at_m: [f64; 2]| at_m.map(|metres| libm::floor(metres / tile_m) as i32);
-        let home = tile_of(sensor);
-        self.map.keep_around(home);
-        let half = (self.window.side() / 2) as i32;
-        self.window.begin(home.map(|tile| tile - half));
-        self.evidence
-            .begin(scan, plane, ground, heights_m, &self.parameters);
-        self.is_moving.clear();
-        self.is_moving.resize(scan.len(), false);
-        for object in objects {
-            self.note_moving(scan, object, sweep);
-        }
-        sweep.placements(scan.columns(), &mut self.placements);
-        self.collect(scan, heights_m);
-        self.free_cells(scan, sweep);
-        self.occupy_cells();
-        for object in objects {
-            self.clear_way(object, scan.time());
-        }
-    }
-
-    /// A new map where positions before and after cannot be compared.
-    fn begin_map(&mut self, sweep: &Sweep, time: Time) {
-        if self.epoch == Some(sweep.epoch) {
-            return;
-        }
-        self.epoch = Some(sweep.epoch);
-        self.map.clear();
-        self.revolution = 0;
-        // Other runs of the service began at other times.
-        let from_time = (time.micros() / 10_000) as u32;
-        self.map_id = if from_time == self.map_id {
-            from_time.wrapping_add(1)
-        } else {
-            from_time
-        };
-    }
-
-    /// Whether a road user is seen to move, without a doubt.
-    fn moves(&self, object: &Object) -> bool {
-        let least_mps = self.parameters.moving_mps + object.speed_deviation_mps;
-        object.measured && libm::fabs(object.speed_mps) > least_mps
-    }
-
-    /// Marks the returns on a road user that moves. Each was where it was when it was seen.
-    fn note_moving(&mut self, scan: &Scan, object: &Object, sweep: &Sweep) {
-        if !self.moves(object) {
-            return;
-        }
-        let placement = sweep.sensor.placement();
-        let mut rectangle = object.rectangle();
-        let (sine, cosine) = libm::sincos(object.yaw_rad);
-        let velocity_mps = [object.speed_mps * cosine, object.speed_mps * sine];
-        rectangle.length_m += object.speed_mps.abs() * scan.duration_s();
-        let corners = rectangle.corners().map(|corner| placement.sensor_m(corner));
-        let Some((first, count)) = scan.columns_across(&corners) else {
-            return;
-        };
-        let outline = object.rectangle().outline();
-        let margin_m = self.parameters.moving_margin_m;
-        // The margin is wider than a few columns only near the sensor.
-        let distance_m = libm::hypot(corners[0][0], corners[0][1]).max(1.0);
-        let aside = (margin_m / (distance_m * libm::fabs(scan.step_rad()))) as usize + 1;
-        let columns = scan.columns();
-        let first = (first + columns - aside.min(columns)) % columns;
-        for column in (first..first + (count + 2 * aside).min(columns)).map(|n| n % columns) {
-            let age_s = scan.age_s(column);
-            for layer in 0..MAX_LAYERS {
-                let point = scan.index(column, layer);
-                if !scan.has_return(point) {
-                    continue;
-                }
-                let [x, y, _] = scan.point_m(point).map(f64::from);
-                let [x, y] = sweep
-                    .pose(column as f64 / columns as f64)
-                    .placement()
-                    .local_m([x, y]);
-                let then = [x + age_s * velocity_mps[0], y + age_s * velocity_mps[1]];
-                self.is_moving[point] |= outline.distance_m(then) <= margin_m;
-            }
-        }
-    }
-
-    /// Where something moves nothing stands: takes back what was seen in its box, and, as long
-    /// as it is new, in those before.
-    fn clear_way(&mut self, object: &Object, now: Time) {
-        if !self.moves(object) {
-            return;
-        }
-        let age_s = (now - object.first_seen).seconds();
-        let back_m = if age_s < UNKNOWN_S {
-            object.speed_mps * age_s
-        } else {
-            0.0
-        };
-        let mut way = object.rectangle();
-        let (sine, cosine) = libm::sincos(object.yaw_rad);
-        way.centre_m[0] -= 0.5 * back_m * cosine;
-        way.centre_m[1] -= 0.5 * back_m * sine;
-        way.length_m += libm::fabs(back_m);
-        let outline = way.outline();
-        let cell_m = self.parameters.cell_m;
-        let corners = way.corners();
-        let bound = |axis: usize, pick: fn(f64, f64) -> f64| {
-            let of_axis = corners.iter().map(|corner| corner[axis] / cell_m);
-            libm::floor(of_axis.reduce(pick).unwrap_or(0.0)) as i32
-        };
-        for y in bound(1, f64::min)..=bound(1, f64::max) {
-            for x in bound(0, f64::min)..=bound(0, f64::max) {
-                let middle_m = [x, y].map(|at| (f64::from(at) + 0.5) * cell_m);
-                if outline.distance_m(middle_m) > 0.0 {
-                    continue;
-                }
-                if let Some((tile, place)) = self.map.cell_mut([x, y])
-                    && tile.log_odds[place] > 0
-                {
-                    tile.set(place, 0, self.revolution);
-                }
-            }
-        }
-    }
-
-    /// Marks cells that rays passed, and those in which rays ended.
-    fn collect(&mut self, scan: &Scan, heights_m: &[f32]) {
-        self.hits.clear();
-        let per_cell = 1.0 / self.parameters.cell_m;
-        let corner = self.window.corner();
-        let reach_m = self.parameters.reach_m as f32;
-        // A beam is nearly as wide as the step from column to column (VLP-16 user manual: 3
-        // mrad). Where that is more than a cell, it is cast as several rays beside each other.
-        let step_rad = libm::fabs(scan.step_rad());
-        let dense_m = self.parameters.cell_m / step_rad;
-        let beams = libm::ceil(self.parameters.reach_m / dense_m) as usize;
-        for column in 0..scan.columns() {
-            let placement = self.placements[column];
-            let cells = |at_m: [f64; 2]| [0, 1].map(|axis| at_m[axis] * per_cell - corner[axis]);
-            for layer in 0..MAX_LAYERS {
-                let point = scan.index(column, layer);
-                let near = |distance_m: &f32| *distance_m <= reach_m && !self.is_moving[point];
-                if self.evidence.obstacle_m(point).filter(near).is_none() {
-                    continue;
-                }
-                let [x, y, _] = scan.point_m(point).map(f64::from);
-                if let Some(cell) = self.window.hit(cells(placement.local_m([x, y]))) {
-                    let top = (heights_m[point] / HEIGHT_UNIT_M) as u8;
-                    self.hits.push((cell, top));
-                }
-            }
-            let [sine, cosine] = scan.direction(column).map(f64::from);
-            let passed = self.evidence.passed(column, scan, &self.parameters);
-            let at = |metres: f64, aside: f64| {
-                let (right, ahead) = (sine + aside * cosine, cosine - aside * sine);
-                cells(placement.local_m([metres * right, metres * ahead]))
-            };
-            for (from_m, to_m) in passed.iter() {
-                let (from_m, to_m) = (f64::from(from_m), f64::from(to_m));
-                if from_m < dense_m {
-                    self.window
-                        .pass(at(from_m, 0.0), at(to_m.min(dense_m), 0.0));
-                }
-                if to_m > dense_m {
-                    for n in 0..beams {
-                        let aside = scan.step_rad() * ((n as f64 + 0.5) / beams as f64 - 0.5);
-                        self.window
-                            .pass(at(from_m.max(dense_m), aside), at(to_m, aside));
-                    }
-                }
-            }
-        }
-    }
-
-    /// Takes the evidence of free space in.
-    fn free_cells(&mut self, scan: &Scan, sweep: &Sweep) {
-        let placement = sweep.sensor.placement();
-        let cell_m = self.parameters.cell_m;
-        let sensor = placement.origin_m().map(|metres| metres / cell_m);
-        for y in 0..self.window.side() {
-            for x in 0..self.window.side() {
-                let is_seen = |row: usize| self.window.free(x, y, row) != 0;
-                if !(0..TILE_CELLS).any(is_seen) {
-                    continue;
-                }
-                let place = self.window.tile(x, y);
-                let tile = self.map.tile_mut(place);
-                for row in 0..TILE_CELLS {
-                    let mut cells = self.window.free(x, y, row) & !tile.surely_free[row];
-                    let north = f64::from(place[1]) * TILE_CELLS as f64 + row as f64 + 0.5;
-                    let up = north - sensor[1];
-                    while cells != 0 {
-                        let column = cells.trailing_zeros() as usize;
-                        cells &= cells - 1;
-                        let east = f64::from(place[0]) * TILE_CELLS as f64 + column as f64 + 0.5;
-                        let right = east - sensor[0];
-                        let distance = libm::sqrt(right * right + up * up);
-                        let cell = row * TILE_CELLS + column;
-                        let before = tile.log_odds[cell];
-                        if before > 0 {
-                            let at = placement.sensor_m([east * cell_m, north * cell_m]);
-                            let azimuth = scan.column_at(libm::atan2(at[0], at[1]));
-                            let top_m = f32::from(tile.top[cell]) * HEIGHT_UNIT_M;
-                            let distance_m = (distance * cell_m) as f32;
-                            let pass_m = self.evidence.lowest_pass_m(azimuth, distance_m);
-                            if pass_m > (BELOW_SHARE * top_m).min(top_m - BELOW_TOP_M) {
-                                continue;
-                            }
-                        }
-                        let step = self.passed[(distance as usize).min(self.passed.len() - 1)];
-                        let after = (before + step).max(self.lowest);
-                        tile.set(cell, after, self.revolution);
-                        if after == self.lowest {
-                            tile.surely_free[row] |= 1 << column;
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    /// Takes the returns in.
-    fn occupy_cells(&mut self) {
-        for (cell, top) in &self.hits {
-            let ([x, y], place) = cell.in_tile();
-            let tile = self.map.tile_mut(self.window.tile(x, y));
-            if self.window.take_hit(*cell) {
-                let before = tile.log_odds[place];
-                let after = (before + self.hit).min(self.highest);
-                tile.set(place, after, self.revolution);
-                tile.surely_free[place / TILE_CELLS] &= !(1 << (place % TILE_CELLS));
-            }
-            tile.top[place] = tile.top[place].max(*top);
         }
     }
 }

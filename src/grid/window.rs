@@ -69,35 +69,25 @@ impl Window {
             return;
         }
         let (first, last) = (y0.max(0.0) as usize, y1.min(top - 1.0) as usize);
-        let mut enters = x0 + (first as f64 - y0).max(0.0) * slope;
-        for row in first..last {
-            let leaves = x0 + ((row + 1) as f64 - y0) * slope;
-            self.pass_row(row, enters, leaves);
-            enters = leaves;
+        let step = fixed(slope);
+        let mut enters = fixed(x0 + (first as f64 - y0).max(0.0) * slope);
+        let mut leaves = fixed(x0 + ((first + 1) as f64 - y0) * slope);
+        let is_inside = x0.min(x1) >= 0.0 && x0.max(x1) < top;
+        let mut rows =
+            self.passed[first * self.side..(last + 1) * self.side].chunks_exact_mut(self.side);
+        let last_row = rows.next_back();
+        for row in rows {
+            if is_inside {
+                pass_row(row, enters, leaves);
+            } else {
+                pass_row_clipped(row, enters, leaves);
+            }
+            (enters, leaves) = (leaves, leaves + step);
         }
-        let leaves = if y1 < top { x1 } else { enters + slope };
-        self.pass_row(last, enters, leaves);
-    }
-
-    /// Marks the cells of a row from one place to another.
-    fn pass_row(&mut self, row: usize, a: f64, b: f64) {
-        let (low, high) = (a.min(b), a.max(b));
-        let cells = self.cells();
-        if high < 0.0 || low >= cells as f64 {
-            return;
+        if let Some(row) = last_row {
+            let ends = if y1 < top { fixed(x1) } else { leaves };
+            pass_row_clipped(row, enters, ends);
         }
-        let (first, last) = (low.max(0.0) as usize, (high as usize).min(cells - 1));
-        let words = &mut self.passed[row * self.side..(row + 1) * self.side];
-        let (first_word, last_word) = (first / TILE_CELLS, last / TILE_CELLS);
-        let from_first = !0 << (first % TILE_CELLS);
-        let to_last = !0 >> (TILE_CELLS - 1 - last % TILE_CELLS);
-        if first_word == last_word {
-            words[first_word] |= from_first & to_last;
-            return;
-        }
-        words[first_word] |= from_first;
-        words[first_word + 1..last_word].fill(!0);
-        words[last_word] |= to_last;
     }
 
     /// Marks the cell in which a ray ended, in cells from the south-west corner. Gives it, or
@@ -135,6 +125,37 @@ impl Window {
     pub(super) fn free(&self, x: usize, y: usize, row: usize) -> u64 {
         let word = (y * TILE_CELLS + row) * self.side + x;
         self.passed[word] & !self.hit[word]
+    }
+}
+
+/// Bits behind the point of places along a row: after a thousand rows they are still right to a
+/// millionth of a cell.
+const FRACTION_BITS: u32 = 32;
+
+fn fixed(cells: f64) -> i64 {
+    (cells * (1u64 << FRACTION_BITS) as f64) as i64
+}
+
+/// Marks the cells of a row from one place to another, both within the row.
+fn pass_row(row: &mut [u64], a: i64, b: i64) {
+    let first = (a.min(b) >> FRACTION_BITS) as usize;
+    let last = (a.max(b) >> FRACTION_BITS) as usize;
+    let (word, bit, more) = (first / TILE_CELLS, first % TILE_CELLS, last - first);
+    if bit + more < TILE_CELLS {
+        row[word] |= (!0 >> (TILE_CELLS - 1 - more)) << bit;
+        return;
+    }
+    let last_word = last / TILE_CELLS;
+    row[word] |= !0 << bit;
+    row[word + 1..last_word].fill(!0);
+    row[last_word] |= !0 >> (TILE_CELLS - 1 - last % TILE_CELLS);
+}
+
+/// The same, of which some may lie outside.
+fn pass_row_clipped(row: &mut [u64], a: i64, b: i64) {
+    let end = ((row.len() * TILE_CELLS) as i64) << FRACTION_BITS;
+    if a.max(b) >= 0 && a.min(b) < end {
+        pass_row(row, a.clamp(0, end - 1), b.clamp(0, end - 1));
     }
 }
 

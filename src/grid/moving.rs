@@ -1,0 +1,85 @@
+//! Road users that move, for the map to leave them out.
+
+use super::GridParameters;
+use super::map::Map;
+use crate::cloud::{MAX_LAYERS, Scan};
+use crate::ego::{Placement, Sweep};
+use crate::time::Time;
+use crate::track::Object;
+
+/// Time from its first sight within which a road user that moves may have marked the map before
+/// it was known to move.
+const UNKNOWN_S: f64 = 1.5;
+
+/// Whether a road user is seen to move, without a doubt.
+pub(super) fn moves(object: &Object, parameters: &GridParameters) -> bool {
+    let least_mps = parameters.moving_mps + object.speed_deviation_mps;
+    object.measured && libm::fabs(object.speed_mps) > least_mps
+}
+
+/// Marks the returns on a road user that moves. Its box is valid at the end of the sweep; each
+/// return is compared with where it was when it was seen.
+pub(super) fn mark_returns(
+    object: &Object,
+    scan: &Scan,
+    sweep: &Sweep,
+    placements: &[Placement],
+    margin_m: f64,
+    is_moving: &mut [bool],
+) {
+    let (sine, cosine) = libm::sincos(object.yaw_rad);
+    let velocity_mps = [object.speed_mps * cosine, object.speed_mps * sine];
+    let mut way = object.rectangle();
+    way.length_m += 2.0 * (margin_m + libm::fabs(object.speed_mps) * scan.duration_s());
+    way.width_m += 2.0 * margin_m;
+    let placement = sweep.sensor.placement();
+    let corners = way.corners().map(|corner| placement.sensor_m(corner));
+    let columns = scan.columns();
+    let (first, count) = scan.columns_across(&corners).unwrap_or((0, columns));
+    let outline = object.rectangle().outline();
+    for column in (first..first + count).map(|column| column % columns) {
+        let age_s = scan.age_s(column);
+        for point in (0..MAX_LAYERS).map(|layer| scan.index(column, layer)) {
+            if scan.has_return(point) {
+                let [x, y, _] = scan.point_m(point).map(f64::from);
+                let [x, y] = placements[column].local_m([x, y]);
+                let at_end = [x + age_s * velocity_mps[0], y + age_s * velocity_mps[1]];
+                is_moving[point] |= outline.distance_m(at_end) <= margin_m;
+            }
+        }
+    }
+}
+
+/// Where something moves nothing stands: takes back what was seen in its box, and, as long as it
+/// is new, in those before.
+pub(super) fn clear_way(object: &Object, now: Time, map: &mut Map, cell_m: f64, revolution: u32) {
+    let age_s = (now - object.first_seen).seconds();
+    let is_new = age_s < UNKNOWN_S;
+    let back_m = if is_new {
+        object.speed_mps * age_s
+    } else {
+        0.0
+    };
+    let mut way = object.rectangle();
+    let (sine, cosine) = libm::sincos(object.yaw_rad);
+    way.centre_m[0] -= 0.5 * back_m * cosine;
+    way.centre_m[1] -= 0.5 * back_m * sine;
+    way.length_m += libm::fabs(back_m);
+    let outline = way.outline();
+    let corners = way.corners();
+    let bound = |axis: usize, pick: fn(f64, f64) -> f64| {
+        let places = corners.iter().map(|corner| corner[axis] / cell_m);
+        libm::floor(places.reduce(pick).unwrap_or(0.0)) as i32
+    };
+    for y in bound(1, f64::min)..=bound(1, f64::max) {
+        for x in bound(0, f64::min)..=bound(0, f64::max) {
+            let middle_m = [x, y].map(|at| (f64::from(at) + 0.5) * cell_m);
+            if let Some((tile, cell)) = map.cell_mut([x, y])
+                && tile.log_odds[cell] > 0
+                && outline.distance_m(middle_m) <= 0.0
+            {
+                tile.set(cell, 0, revolution);
+            }
+        }
+    }
+}
