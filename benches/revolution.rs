@@ -31,9 +31,10 @@ fn cpu_time() -> Duration {
     Duration::from(nix::time::clock_gettime(clock).unwrap())
 }
 
-/// Median and 99th percentile in microseconds.
+/// Median and 99th percentile in microseconds, once everything is warm.
 fn measure(rounds: usize, mut work: impl FnMut(usize)) -> (f64, f64) {
-    let mut times: Vec<f64> = (0..rounds)
+    work(0);
+    let mut times: Vec<f64> = (1..=rounds)
         .map(|round| {
             let begin = cpu_time();
             work(round);
@@ -199,7 +200,7 @@ fn bench(name: &str, frames: &[Vec<u8>], rounds: usize, unit_us: f64) {
         );
     }
 
-    let inputs: Vec<Vec<u8>> = (0..rounds)
+    let inputs: Vec<Vec<u8>> = (0..=rounds)
         .map(|round| {
             let (cloud, sampled) = at_time(&frames[round % frames.len()], round);
             let mut frame = vec![];

@@ -137,6 +137,7 @@ fn fixed(cells: f64) -> i64 {
 }
 
 /// Marks the cells of a row from one place to another, both within the row.
+#[inline(always)]
 fn pass_row(row: &mut [u64], a: i64, b: i64) {
     let first = (a.min(b) >> FRACTION_BITS) as usize;
     let last = (a.max(b) >> FRACTION_BITS) as usize;
