@@ -10,6 +10,8 @@ use crate::track::Object;
 /// Time from its first sight within which a road user that moves may have marked the map before
 /// it was known to move.
 const UNKNOWN_S: f64 = 1.5;
+/// How unsure the edges of its box are.
+const EDGE_M: f64 = 0.2;
 
 /// Whether a road user is seen to move, without a doubt.
 pub(super) fn moves(object: &Object, parameters: &GridParameters) -> bool {
@@ -64,7 +66,8 @@ pub(super) fn clear_way(object: &Object, now: Time, map: &mut Map, cell_m: f64, 
     let (sine, cosine) = libm::sincos(object.yaw_rad);
     way.centre_m[0] -= 0.5 * back_m * cosine;
     way.centre_m[1] -= 0.5 * back_m * sine;
-    way.length_m += libm::fabs(back_m);
+    way.length_m += libm::fabs(back_m) + 2.0 * EDGE_M;
+    way.width_m += 2.0 * EDGE_M;
     let outline = way.outline();
     let corners = way.corners();
     let bound = |axis: usize, pick: fn(f64, f64) -> f64| {
