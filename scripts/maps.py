@@ -124,8 +124,9 @@ def stream_scores(recording, truth, true_path):
         everyone.take(tiles)
         sizes.append(size)
         users = truth[number]["objects"]
-        if number > 20 and number % 3 == 0:
-            for user in truth[number - 10]["objects"]:
+        if number > 20:
+            # Cells that it left one second ago.
+            for user in truth[number - 11]["objects"]:
                 if abs(user["v"]) < MOVING_MPS or user["points"] < 5:
                     continue
                 radius = user["l"] / 2
@@ -136,7 +137,9 @@ def stream_scores(recording, truth, true_path):
                 x, y = (columns + 0.5) * cell, (rows + 0.5) * cell
                 column = ((x - origin[0]) / cell).astype(int).clip(0, bits.shape[1] - 1)
                 row = ((y - origin[1]) / cell).astype(int).clip(0, bits.shape[0] - 1)
-                over = within([user], x, y, 0) & ~within(users, x, y, 0.3) & (bits[row, column] & OCCUPIED == 0)
+                over = within([user], x, y, 0) & (bits[row, column] & OCCUPIED == 0)
+                for later in [truth[number - 10]["objects"], users]:
+                    over &= ~within(later, x, y, 0.05)
                 left += np.sum(over)
                 marked += np.sum(everyone.occupied(columns[over], rows[over]))
         if number >= 10 * LATE_JOIN_S and math.isnan(joined):
