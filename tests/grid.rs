@@ -15,8 +15,31 @@ use kreisel::wire::point_cloud::CompactPointCloud;
 use kreisel::wire::pose::SimulationFrame;
 use kreisel::wire::{Envelope, Message};
 
-const HEIGHT_M: f64 = 2.0;
-const COLUMNS: usize = 1800;
+/// A sensor and how it stands.
+struct Mounted {
+    height_m: f64,
+    columns: usize,
+    azimuths_deg: [f64; 2],
+    elevations_deg: &'static [f64],
+}
+
+const VLP16: Mounted = Mounted {
+    height_m: 2.0,
+    columns: 1800,
+    azimuths_deg: [0.1, 359.9],
+    elevations_deg: &[
+        -15.0, -13.0, -11.0, -9.0, -7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0, 9.0, 11.0, 13.0,
+        15.0,
+    ],
+};
+
+/// Above the bumper of a car.
+const IBEO_LUX_8L: Mounted = Mounted {
+    height_m: 0.6,
+    columns: 441,
+    azimuths_deg: [-50.0, 60.0],
+    elevations_deg: &[-2.8, -2.0, -1.2, -0.4, 0.4, 1.2, 2.0, 2.8],
+};
 
 /// A box: low and high corner.
 type Box3 = [[f64; 3]; 2];
@@ -31,6 +54,7 @@ struct Drive {
     /// Place of the sensor; it looks north.
     sensor_m: [f64; 2],
     has_poses: bool,
+    sensor: Mounted,
 }
 
 impl Drive {
@@ -42,6 +66,7 @@ impl Drive {
             now: Time::from_micros(1_700_000_000_000_000),
             sensor_m: [0.0; 2],
             has_poses: false,
+            sensor: VLP16,
         }
     }
 
@@ -57,11 +82,11 @@ impl Drive {
 
     /// Turns the sensor once in a world, and gives the tiles that are sent.
     fn revolve(&mut self, world: &[Box3]) -> Vec<GridTile> {
-        let distances = ranges(self.sensor_m, world);
+        let distances = ranges(&self.sensor, self.sensor_m, world);
         let cloud = CompactPointCloud {
-            start_azimuth_deg: 0.1,
-            end_azimuth_deg: 359.9,
-            layers: 16,
+            start_azimuth_deg: self.sensor.azimuths_deg[0] as f32,
+            end_azimuth_deg: self.sensor.azimuths_deg[1] as f32,
+            layers: self.sensor.elevations_deg.len() as u8,
             distances: &distances,
             ..CompactPointCloud::default()
         };
@@ -138,19 +163,21 @@ fn postmark(sampled: Time) -> Postmark {
 }
 
 /// Distances of a revolution in centimetres: boxes on flat ground.
-fn ranges(sensor_m: [f64; 2], world: &[Box3]) -> Vec<u8> {
-    let origin = [sensor_m[0], sensor_m[1], HEIGHT_M];
+fn ranges(sensor: &Mounted, sensor_m: [f64; 2], world: &[Box3]) -> Vec<u8> {
+    let origin = [sensor_m[0], sensor_m[1], sensor.height_m];
+    let [first_deg, last_deg] = sensor.azimuths_deg;
     let mut out = vec![];
-    for column in 0..COLUMNS {
-        let azimuth_rad = (0.1 + 359.8 * column as f64 / (COLUMNS - 1) as f64).to_radians();
-        for layer in 0..16 {
-            let elevation_rad = (2.0 * f64::from(layer) - 15.0).to_radians();
+    for column in 0..sensor.columns {
+        let share = column as f64 / (sensor.columns - 1) as f64;
+        let azimuth_rad = (first_deg + share * (last_deg - first_deg)).to_radians();
+        for elevation_deg in sensor.elevations_deg {
+            let elevation_rad = elevation_deg.to_radians();
             let direction = [
                 azimuth_rad.sin() * elevation_rad.cos(),
                 azimuth_rad.cos() * elevation_rad.cos(),
                 elevation_rad.sin(),
             ];
-            let ground_m = -HEIGHT_M / direction[2];
+            let ground_m = -sensor.height_m / direction[2];
             let ground_m = if ground_m > 0.0 { ground_m } else { f64::MAX };
             let boxes = world
                 .iter()
@@ -190,6 +217,24 @@ fn a_wall_is_occupied_the_way_to_it_free_and_what_is_behind_unknown() {
         assert_eq!(drive.probability([0.0, y]), 0.5, "{y}");
     }
     assert!(drive.occupied([-5.9, 8.05], [5.9, 8.05]) >= 115);
+}
+
+#[test]
+fn a_sensor_of_eight_layers_and_a_part_of_the_circle_maps_what_it_sees() {
+    let mut drive = Drive::standing();
+    drive.sensor = IBEO_LUX_8L;
+    let far = [[-8.05, 30.05, 0.0], [8.05, 30.45, 2.5]];
+    let aside = [[20.05, -6.0, 0.0], [20.45, 6.0, 2.5]];
+    drive.revolve_for(10, &[far, aside]);
+    // Returns are 13 cm apart there.
+    assert!(drive.occupied([-7.9, 30.05], [7.9, 30.05]) >= 110);
+    for y in [0.5, 3.0, 12.0, 25.0, 29.5] {
+        assert!(drive.probability([0.0, y]) < 0.5, "{y}");
+    }
+    // Behind the wall, beside the field of view, behind the sensor.
+    for at_m in [[0.0, 32.0], [20.05, 0.0], [10.0, 0.0], [0.0, -10.0]] {
+        assert_eq!(drive.probability(at_m), 0.5, "{at_m:?}");
+    }
 }
 
 #[test]

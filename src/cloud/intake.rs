@@ -72,7 +72,7 @@ impl Intake {
             return Err(unknown);
         }
         self.check_sender(envelope.sender_stamp, parameters)?;
-        let (start_deg, step_deg) = self.check_azimuths(&cloud, parameters)?;
+        let (start_deg, step_deg) = self.check_azimuths(&cloud, sensor, parameters)?;
         let (time, time_jumped) = self.check_time(envelope, &cloud, sensor)?;
         let dialect = self.detector.dialect(&cloud, parameters).ok_or(unknown)?;
         self.last_time = Some(time);
@@ -114,13 +114,15 @@ impl Intake {
     fn check_azimuths(
         &mut self,
         cloud: &CompactPointCloud<'_>,
+        sensor: &Sensor,
         parameters: &CloudParameters,
     ) -> Result<(f64, f64), Refusal> {
         let columns = cloud.columns();
         let (start_deg, signed_span_deg) = span_deg(cloud)?;
         let span_deg = signed_span_deg.abs();
         let step_deg = span_deg / (columns.max(2) - 1) as f64;
-        if span_deg + step_deg < parameters.least_span_deg {
+        let least_deg = parameters.least_span_deg * sensor.field_deg / 360.0;
+        if span_deg + step_deg < least_deg {
             return Err(Refusal::PartialRevolution { columns, span_deg });
         }
         self.check_step(step_deg, cloud, parameters)?;
@@ -203,7 +205,7 @@ fn check_shape(cloud: &CompactPointCloud<'_>) -> Result<&'static Sensor, Refusal
         return Err(Refusal::ZeroLayers);
     }
     let sensor = sensor::identify(cloud).ok_or(Refusal::UnknownSensor { layers })?;
-    if *sensor != sensor::VLP16 {
+    if ![&sensor::VLP16, &sensor::IBEO_LUX_8L].contains(&sensor) {
         return Err(Refusal::TooManyLayers {
             sensor: sensor.name,
             layers,

@@ -82,7 +82,8 @@ parameters! {
         /// lost between sensor and device widen it, and azimuths between first and last column
         /// are then wrong: one packet of 75 widens it by 0.013.
         step_tolerance: f64 = 0.01, in 0.001..=0.5, "";
-        /// Part of the circle that a message must cover to be a revolution.
+        /// Part of the circle that a message must cover to be a revolution; of a sensor that
+        /// sees less than the circle, the same share of its field.
         least_span_deg: f64 = 350.0, in 1.0..=359.0, "degrees";
     }
 }

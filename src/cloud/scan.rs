@@ -18,6 +18,9 @@ pub const CAPACITY: usize = MAX_COLUMNS * MAX_LAYERS;
 /// own vehicle. A point without a return has the range 0.
 pub const MASKED: f32 = -1.0;
 
+/// Tangent and cosine of the elevation of layers that a sensor does not have: they meet nothing.
+const UPRIGHT: (f64, f64) = (1e6, 1e-6);
+
 /// One revolution in the sensor frame: x right, y forward, z up. A structure of arrays,
 /// indexed by [`Scan::index`]; made once, filled again for every revolution.
 #[derive(Debug, Clone)]
@@ -73,15 +76,19 @@ impl Scan {
     fn read_ranges(&mut self, revolution: &Revolution<'_>, parameters: &CloudParameters) {
         let dialect = revolution.dialect;
         let kept = parameters.minimum_range_m as f32..=parameters.maximum_range_m as f32;
-        let distances = revolution.cloud.distances.chunks_exact(2);
-        for (range_m, bytes) in self.range_m.iter_mut().zip(distances) {
-            let units = dialect.byte_order.join([bytes[0], bytes[1]]) & dialect.distance_mask;
-            let measured_m = f32::from(units) * dialect.unit_m;
-            *range_m = match units {
-                0 => 0.0,
-                _ if kept.contains(&measured_m) => measured_m,
-                _ => MASKED,
-            };
+        let layers = usize::from(revolution.cloud.layers);
+        let columns = revolution.cloud.distances.chunks_exact(2 * layers);
+        for (ranges_m, bytes) in self.range_m.chunks_exact_mut(MAX_LAYERS).zip(columns) {
+            for (range_m, bytes) in ranges_m.iter_mut().zip(bytes.as_chunks::<2>().0) {
+                let units = dialect.byte_order.join(*bytes) & dialect.distance_mask;
+                let measured_m = f32::from(units) * dialect.unit_m;
+                *range_m = match units {
+                    0 => 0.0,
+                    _ if kept.contains(&measured_m) => measured_m,
+                    _ => MASKED,
+                };
+            }
+            ranges_m[layers..].fill(MASKED);
         }
     }
 
@@ -94,6 +101,7 @@ impl Scan {
             let (sine, cosine) = libm::sincos(degrees.to_radians());
             *slot = (sine as f32, cosine as f32);
         }
+        self.slopes = [UPRIGHT; MAX_LAYERS];
         for (slope, degrees) in self.slopes.iter_mut().zip(self.sensor.elevation_deg) {
             let (sine, cosine) = libm::sincos(degrees.to_radians());
             *slope = (sine / cosine, cosine);
@@ -166,7 +174,7 @@ impl Scan {
     }
 
     /// First column and number of columns in which corners in the sensor frame lie; `None`
-    /// where they lie around the sensor itself.
+    /// where they lie around the sensor itself, or where it does not look.
     pub fn columns_across(&self, corners_m: &[[f64; 2]; 4]) -> Option<(usize, usize)> {
         let [x, y] = [0, 1].map(|axis| corners_m.iter().map(|corner| corner[axis]).sum::<f64>());
         let middle_rad = libm::atan2(x, y);
@@ -177,6 +185,15 @@ impl Scan {
         }
         if high - low > std::f64::consts::PI || self.step_rad <= 0.0 {
             return None;
+        }
+        if !self.sensor.sees_all_round() {
+            let field_rad = self.columns as f64 * self.step_rad;
+            let begin_rad = wrapped_rad(middle_rad - self.start_rad - 0.5 * field_rad);
+            let begin_rad = begin_rad + 0.5 * field_rad;
+            (low, high) = (low.max(-begin_rad), high.min(field_rad - begin_rad));
+            if low >= high {
+                return None;
+            }
         }
         let count = ((high - low) / self.step_rad) as usize + 1;
         Some((self.column_at(middle_rad + low), count.min(self.columns)))

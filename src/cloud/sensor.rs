@@ -11,6 +11,15 @@ pub struct Sensor {
     pub elevation_deg: &'static [f64],
     /// From one column to the next, seconds.
     pub column_period_s: f64,
+    /// How much of the circle it sees.
+    pub field_deg: f64,
+}
+
+impl Sensor {
+    /// Whether its columns go all round.
+    pub fn sees_all_round(&self) -> bool {
+        self.field_deg >= 360.0
+    }
 }
 
 /// Velodyne VLP-16: 16 layers from -15 to 15 degrees (user manual, firing every 55.296 us).
@@ -21,6 +30,16 @@ pub static VLP16: Sensor = Sensor {
         15.0,
     ],
     column_period_s: 55.296e-6,
+    field_deg: 360.0,
+};
+
+/// Ibeo LUX 8L: two times four layers 0.8 degrees apart, 110 degrees in steps of 0.25 at 25 Hz
+/// (Chen 2021, table 2.3).
+pub static IBEO_LUX_8L: Sensor = Sensor {
+    name: "Ibeo LUX 8L",
+    elevation_deg: &[-2.8, -2.0, -1.2, -0.4, 0.4, 1.2, 2.0, 2.8],
+    column_period_s: 0.25 / 360.0 / 25.0,
+    field_deg: 110.0,
 };
 
 /// The three messages of a revolution of a Velodyne HDL-32E, in the order in which they come.
@@ -31,6 +50,7 @@ pub static HDL32E: [Sensor; 3] = [
             -30.67, -29.33, -25.33, -21.33, -17.33, -13.33, -9.33, -5.33, -1.33, 2.67, 6.67, 10.67,
         ],
         column_period_s: 46.08e-6,
+        field_deg: 360.0,
     },
     Sensor {
         name: "HDL-32E",
@@ -38,11 +58,13 @@ pub static HDL32E: [Sensor; 3] = [
             -28.0, -26.67, -22.67, -18.67, -14.67, -10.67, -6.67, -2.67, 1.33, 5.33, 9.33,
         ],
         column_period_s: 46.08e-6,
+        field_deg: 360.0,
     },
     Sensor {
         name: "HDL-32E",
         elevation_deg: &[-24.0, -20.0, -16.0, -12.0, -8.0, -4.0, 0.0, 4.0, 8.0],
         column_period_s: 46.08e-6,
+        field_deg: 360.0,
     },
 ];
 
@@ -55,6 +77,7 @@ pub static VLP32C: [Sensor; 3] = [
             15.0,
         ],
         column_period_s: 55.296e-6,
+        field_deg: 360.0,
     },
     Sensor {
         name: "VLP-32C",
@@ -62,11 +85,13 @@ pub static VLP32C: [Sensor; 3] = [
             -11.31, -8.843, -5.333, -3.667, -2.667, -1.667, -0.667, 0.333, 1.333, 3.333, 10.333,
         ],
         column_period_s: 55.296e-6,
+        field_deg: 360.0,
     },
     Sensor {
         name: "VLP-32C",
         elevation_deg: &[-6.148, -4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.333, 7.0],
         column_period_s: 55.296e-6,
+        field_deg: 360.0,
     },
 ];
 
@@ -84,7 +109,8 @@ pub fn identify(cloud: &CompactPointCloud<'_>) -> Option<&'static Sensor> {
         LAYOUT_VLP32C => &VLP32C,
         _ => &HDL32E,
     };
-    std::iter::once(&VLP16)
+    [&VLP16, &IBEO_LUX_8L]
+        .into_iter()
         .chain(parts)
         .find(|sensor| sensor.elevation_deg.len() == usize::from(cloud.layers))
 }
@@ -122,6 +148,8 @@ mod tests {
         assert_eq!(identify(&cloud), Some(&VLP32C[0]));
         cloud.layers = 16;
         assert_eq!(identify(&cloud), Some(&VLP16));
+        cloud.layers = 8;
+        assert_eq!(identify(&cloud), Some(&IBEO_LUX_8L));
         cloud.layers = 3;
         assert_eq!(identify(&cloud), None);
     }
