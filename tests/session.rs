@@ -9,15 +9,18 @@
 
 mod common;
 
-use std::io::Read as _;
+use std::io::Read;
 use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::os::unix::process::CommandExt as _;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use kreisel::random::Random;
 use kreisel::simulate::{Simulation, scenario};
+use kreisel::wire::envelope::Postmark;
+use kreisel::wire::grid_tile::GridTile;
 use kreisel::wire::object_list::ObjectList;
 use kreisel::wire::status::Status;
 use kreisel::wire::{Envelope, Message, Recording};
@@ -59,7 +62,20 @@ fn enter_namespace() -> bool {
 
 /// A command that ends with the test, and what it has started itself: libcluon's tools come in
 /// a wrapper.
-struct Running(Child);
+struct Running {
+    child: Child,
+    /// What it prints; read all along, or it would wait for a reader.
+    printed: [Option<JoinHandle<String>>; 2],
+}
+
+/// Reads to the end in a thread.
+fn reading(mut pipe: impl Read + Send + 'static) -> Option<JoinHandle<String>> {
+    Some(std::thread::spawn(move || {
+        let mut text = vec![];
+        let _ = pipe.read_to_end(&mut text);
+        String::from_utf8_lossy(&text).into_owned()
+    }))
+}
 
 impl Running {
     fn start(program: &str, arguments: &[&str]) -> Self {
@@ -69,7 +85,12 @@ impl Running {
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .process_group(0);
-        Self(command.spawn().unwrap())
+        let mut child = command.spawn().unwrap();
+        let printed = [
+            reading(child.stdout.take().unwrap()),
+            reading(child.stderr.take().unwrap()),
+        ];
+        Self { child, printed }
     }
 
     fn kreisel(arguments: &[&str]) -> Self {
@@ -87,25 +108,14 @@ impl Running {
     }
 
     fn signal(&self, signal: Signal) {
-        killpg(Pid::from_raw(self.0.id() as i32), signal).unwrap();
+        killpg(Pid::from_raw(self.child.id() as i32), signal).unwrap();
     }
 
     /// What it printed, once it has ended.
     fn output(mut self) -> (i32, String, String) {
-        let (mut out, mut err) = (String::new(), String::new());
-        self.0
-            .stdout
-            .take()
-            .unwrap()
-            .read_to_string(&mut out)
-            .unwrap();
-        self.0
-            .stderr
-            .take()
-            .unwrap()
-            .read_to_string(&mut err)
-            .unwrap();
-        (self.0.wait().unwrap().code().unwrap_or(-1), out, err)
+        let texts = self.printed.each_mut().map(Option::take);
+        let [out, err] = texts.map(|reader| reader.unwrap().join().unwrap());
+        (self.child.wait().unwrap().code().unwrap_or(-1), out, err)
     }
 
     fn stop(self) -> (i32, String, String) {
@@ -116,8 +126,8 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        let _ = killpg(Pid::from_raw(self.0.id() as i32), Signal::SIGKILL);
-        let _ = self.0.wait();
+        let _ = killpg(Pid::from_raw(self.child.id() as i32), Signal::SIGKILL);
+        let _ = self.child.wait();
     }
 }
 
@@ -238,14 +248,50 @@ fn what_libcluon_replays_is_answered_and_libcluon_decodes_the_answer() {
         drop(player);
         std::thread::sleep(Duration::from_millis(300));
         let (_, json, _) = listener.stop();
-        assert!(json.contains("Parsed 3 message(s)."), "{json:.200}");
+        assert!(json.contains("Parsed 4 message(s)."), "{json:.200}");
         assert_eq!(
             json.matches("\"kreisel_ObjectList\":{\"revolution\":")
                 .count(),
             3
         );
+        assert!(json.contains("\"kreisel_GridTile\":{\"mapId\":"));
         assert!(json.contains("\"senderStamp\":7"));
         assert!(json.contains(&format!("\"count\":{},", last.count)));
+    });
+}
+
+#[test]
+fn the_example_draws_the_map_from_the_session_and_refuses_a_damaged_tile() {
+    if !has_libcluon("cluon-OD4toJSON") {
+        return;
+    }
+    in_namespace(|| {
+        let _daemon = Running::daemon(&[]);
+        let folder = tempfile::tempdir().unwrap();
+        let picture = folder.path().join("map.png");
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts/map");
+        let arguments = [script, text(&picture), "--cid=111", "--seconds=3"];
+        let example = Running::start("python3", &arguments);
+        let peer = Peer::join();
+        // It compiles the messages before it listens.
+        std::thread::sleep(Duration::from_millis(1500));
+        for frame in revolutions(15) {
+            peer.send(&frame);
+            std::thread::sleep(Duration::from_millis(60));
+        }
+        let mut damaged = peer.await_message::<GridTile>(|_| true);
+        damaged.cells.0[0] ^= 1;
+        let mut frame = vec![];
+        Postmark::default().put(&mut frame, &damaged);
+        peer.send(&frame);
+        let (code, out, err) = example.output();
+        assert_eq!(code, 0, "{err}");
+        let words: Vec<&str> = out.split_whitespace().collect();
+        assert!(words[2].parse::<usize>().unwrap() > 50, "{out}");
+        assert_eq!(words[4..], ["1", "refused"], "{out} {err}");
+        assert!(err.contains("refused: checksum of the cells is"), "{err}");
+        let png = std::fs::read(&picture).unwrap();
+        assert!(png.starts_with(b"\x89PNG") && png.len() > 1000);
     });
 }
 
@@ -288,7 +334,6 @@ fn every_hostile_datagram_is_counted_by_name_and_the_next_revolution_is_answered
 
 /// The edge cases of the wire, refusals, and two thousand mutations of a revolution's frame.
 fn hostile_datagrams(revolution: &[u8]) -> Vec<Vec<u8>> {
-    use kreisel::wire::envelope::Postmark;
     use kreisel::wire::point_cloud::CompactPointCloud;
     let cloud = |layers: u8, columns: usize, sender_stamp: u32| {
         let distances = vec![1; 2 * usize::from(layers.max(1)) * columns];
