@@ -83,3 +83,61 @@ impl Casting {
             .fold(dense_m / (2 * apart) as f64, f64::min)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::tests::scan_of;
+    use crate::ego::Pose;
+    use crate::grid::map::TILE_CELLS;
+    use crate::random::Random;
+
+    const CELL_M: f64 = 0.1;
+
+    fn passed(window: &Window) -> Vec<u64> {
+        let side = window.side();
+        let tiles = (0..side * side).map(|tile| (tile % side, tile / side));
+        tiles
+            .flat_map(|(x, y)| (0..TILE_CELLS).map(move |row| window.free(x, y, row)))
+            .collect()
+    }
+
+    #[test]
+    fn what_is_left_out_near_the_sensor_marks_no_cell_more_or_less() {
+        let scan = scan_of(1810, |_, _| 100);
+        let placements = vec![Pose::SENSOR.placement(); scan.columns()];
+        let mut random = Random::new(4);
+        for round in 0..3 {
+            // A few obstacles, each over many columns, and rays that end by chance.
+            let mut ends_m = vec![25.0; scan.columns()];
+            for end_m in &mut ends_m {
+                if random.uniform() < 0.02 * f64::from(round) {
+                    *end_m = 1.0 + 24.0 * random.uniform();
+                }
+            }
+            ends_m[300..500].fill(7.3);
+            ends_m[900..930].fill(2.2);
+            let stretch = |(column, end_m): (usize, &f64)| Stretch {
+                column,
+                from_m: 0.0,
+                to_m: *end_m as f32,
+            };
+            let stretches: Vec<_> = ends_m.iter().enumerate().map(stretch).collect();
+            let (mut thinned, mut plain) = (Window::new(10), Window::new(10));
+            thinned.begin([-5, -5]);
+            plain.begin([-5, -5]);
+            let mut casting = Casting::default();
+            casting.cast(&stretches, &scan, &placements, CELL_M, &mut thinned);
+            let corner = plain.corner();
+            for stretch in &stretches {
+                let [sine, cosine] = scan.direction(stretch.column).map(f64::from);
+                let at = |metres: f64| {
+                    let at_m = [metres * sine, metres * cosine];
+                    [0, 1].map(|axis| at_m[axis] / CELL_M - corner[axis])
+                };
+                plain.pass(at(0.0), at(f64::from(stretch.to_m)));
+            }
+            assert_eq!(passed(&thinned), passed(&plain), "{round}");
+        }
+    }
+}
