@@ -22,6 +22,14 @@ pub(super) struct Spot {
     pub(super) group: u32,
 }
 
+impl Spot {
+    /// Whether it may be a road user's below the height at which trees and roofs are cut off,
+    /// and above that of grass.
+    fn is_at_body_height(&self) -> bool {
+        (LOW_M..=CUT_M).contains(&self.above_m)
+    }
+}
+
 /// A cluster, or a part of one, in the local frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Patch {
@@ -54,13 +62,110 @@ impl Patch {
 /// Places returns and divides clusters.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Placer {
-    cell_m: f64,
-    /// Cell of a spot, and the spot.
-    cells: Vec<([i32; 2], u32)>,
-    /// For each cell its first entry, and the part that it belongs to.
-    parts: Vec<(usize, usize)>,
-    parted: Vec<(usize, Spot)>,
     placements: Vec<Placement>,
+    floor: Floor,
+    /// Whether there is more above each cell.
+    covered: Vec<bool>,
+    /// Of the cells of each part, by the part's number: how many, how many covered.
+    members: Vec<(usize, usize)>,
+    /// The part of each spot, where its spots begin among the others, and the spots themselves.
+    part_of: Vec<Option<u32>>,
+    begins: Vec<usize>,
+    sorted: Vec<Spot>,
+}
+
+/// Cells of one cluster, seen from above, and which of them touch.
+#[derive(Debug, Clone, Default)]
+struct Floor {
+    cell_m: f64,
+    /// The cell in the south-west corner, one beyond the cluster.
+    corner: [i32; 2],
+    /// Cells from south to north, one more than the cluster has on either side.
+    height: usize,
+    /// For every place, one more than the number of the cell in it; 0 where there is none.
+    numbers: Vec<u32>,
+    /// Places of the cells that there are, in their order from west to east.
+    places: Vec<u32>,
+    /// For each cell another one of its part, or itself, the first of the part.
+    parts: Vec<u32>,
+}
+
+impl Floor {
+    /// Empties it for a cluster between these corners.
+    fn begin(&mut self, low_m: Vector2<f64>, high_m: Vector2<f64>, cell_m: f64) {
+        for place in &self.places {
+            self.numbers[*place as usize] = 0;
+        }
+        self.places.clear();
+        self.cell_m = cell_m;
+        let [low, high] = [self.cell(low_m), self.cell(high_m)];
+        self.corner = low.map(|cell| cell - 1);
+        let side = |axis: usize| (high[axis] - low[axis]) as usize + 3;
+        self.height = side(1);
+        let size = side(0) * self.height;
+        if self.numbers.len() < size {
+            self.numbers.resize(size, 0);
+        }
+    }
+
+    fn cell(&self, at_m: Vector2<f64>) -> [i32; 2] {
+        let cell = |metres: f64| {
+            let cells = metres / self.cell_m;
+            let toward_0 = cells as i32;
+            toward_0 - i32::from(f64::from(toward_0) > cells)
+        };
+        [cell(at_m.x), cell(at_m.y)]
+    }
+
+    fn place(&self, at_m: Vector2<f64>) -> usize {
+        let [x, y] = self.cell(at_m);
+        let [x, y] = [x - self.corner[0], y - self.corner[1]];
+        x as usize * self.height + y as usize
+    }
+
+    /// Adds the cell at a place, if it is not there yet.
+    fn add(&mut self, place: usize) {
+        if self.numbers[place] == 0 {
+            self.numbers[place] = 1;
+            self.places.push(place as u32);
+        }
+    }
+
+    /// The number of the cell at a place.
+    fn number(&self, place: usize) -> Option<usize> {
+        (self.numbers[place] as usize).checked_sub(1)
+    }
+
+    /// Numbers the cells and joins those that touch, also by their corners.
+    fn join(&mut self) {
+        self.places.sort_unstable();
+        for (number, place) in self.places.iter().enumerate() {
+            self.numbers[*place as usize] = number as u32 + 1;
+        }
+        self.parts.clear();
+        self.parts.extend(0..self.places.len() as u32);
+        for number in 0..self.places.len() {
+            let place = self.places[number] as usize;
+            let east = place + self.height;
+            for neighbour in [place + 1, east - 1, east, east + 1] {
+                if let Some(other) = self.number(neighbour) {
+                    let (a, b) = (self.root(number), self.root(other));
+                    self.parts[a.max(b)] = a.min(b) as u32;
+                }
+            }
+        }
+        for number in 0..self.places.len() {
+            self.parts[number] = self.root(number) as u32;
+        }
+    }
+
+    /// The first cell of a cell's part.
+    fn root(&self, mut number: usize) -> usize {
+        while self.parts[number] as usize != number {
+            number = self.parts[number] as usize;
+        }
+        number
+    }
 }
 
 /// Side of the cells of which a part consists: surfaces of one body are closer to each other,
@@ -123,7 +228,7 @@ impl Placer {
                 let is_structure = !whole.can_be_road_user(parameters);
                 let first = patches.len();
                 let is_too_tall = whole.top_m > parameters.highest_object_m;
-                self.divide(begin, is_too_tall, scan, spots, patches);
+                self.divide(&whole, is_too_tall, scan, spots, patches);
                 for patch in &mut patches[first..] {
                     patch.is_suspect = is_structure;
                 }
@@ -131,131 +236,97 @@ impl Placer {
         }
     }
 
-    /// Replaces the spots from `begin` on by their parts, one after the other. What is above
-    /// the cut belongs to a part that goes on there, unless all of it is too tall.
+    /// Replaces the spots of a cluster, which are the last ones, by its parts, one after the
+    /// other and each in the order of the scan. What is above the cut belongs to a part that goes
+    /// on there, unless all of it is too tall.
     fn divide(
         &mut self,
-        begin: usize,
+        whole: &Patch,
         is_too_tall: bool,
         scan: &Scan,
         spots: &mut Vec<Spot>,
         patches: &mut Vec<Patch>,
     ) {
-        let nearest_m = spots[begin..]
-            .iter()
-            .map(|spot| scan.range_m()[spot.point as usize])
-            .fold(f32::MAX, f32::min);
-        self.cell_m = CELL_M + CELL_PER_M * (f64::from(nearest_m) - NEAR_M).max(0.0);
-        self.cells.clear();
-        for (number, spot) in spots[begin..].iter().enumerate() {
-            if (LOW_M..=CUT_M).contains(&spot.above_m) {
-                self.cells.push((self.cell_of(spot), number as u32));
+        let own = &spots[whole.begin..];
+        let range_m = |spot: &Spot| scan.range_m()[spot.point as usize];
+        let nearest_m = own.iter().map(range_m).fold(f32::MAX, f32::min);
+        let cell_m = CELL_M + CELL_PER_M * (f64::from(nearest_m) - NEAR_M).max(0.0);
+        self.floor.begin(whole.low_m, whole.high_m, cell_m);
+        for spot in own.iter().filter(|spot| spot.is_at_body_height()) {
+            self.floor.add(self.floor.place(spot.at_m));
+        }
+        self.floor.join();
+        self.count_cells(own, scan);
+        self.assign(own, is_too_tall);
+        let first = whole.begin;
+        self.sorted.clear();
+        self.sorted.extend_from_slice(&spots[first..]);
+        let total = self.begins.last().copied().unwrap_or(0);
+        spots.truncate(first + total);
+        let mut next = std::mem::take(&mut self.begins);
+        for (spot, part) in self.sorted.iter().zip(&self.part_of) {
+            if let Some(part) = part {
+                let at = &mut next[*part as usize];
+                spots[first + *at] = *spot;
+                *at += 1;
             }
         }
-        self.cells.sort_unstable();
-        self.parts.clear();
-        let mut first = 0;
-        for cell in self.cells.chunk_by(|a, b| a.0 == b.0) {
-            self.parts.push((first, self.parts.len()));
-            first += cell.len();
-        }
-        self.join_neighbours();
-        let cells = self.parts.len();
-        let mut above = vec![false; cells];
-        self.look_up(&spots[begin..], scan, &mut above);
-        self.parted.clear();
-        let mut members = vec![(0usize, 0usize); cells];
-        for (cell, is_covered) in above.iter().enumerate() {
-            let part = self.root(cell);
-            members[part].0 += 1;
-            members[part].1 += usize::from(*is_covered);
-            let end = self
-                .parts
-                .get(cell + 1)
-                .map_or(self.cells.len(), |next| next.0);
-            for entry in &self.cells[self.parts[cell].0..end] {
-                self.parted.push((part, spots[begin + entry.1 as usize]));
+        // Each part now ends where the next one begins.
+        let mut start = first;
+        for (part, (count, covered)) in self.members.iter().enumerate() {
+            let end = first + next[part];
+            if end > start {
+                let mut patch = patch_of(&spots[..end], start, scan);
+                patch.goes_on = is_too_tall && *covered as f64 >= GOES_ON * *count as f64;
+                patches.push(patch);
             }
+            start = end;
         }
-        if !is_too_tall {
-            let goes_on = |part: usize| members[part].1 as f64 >= GOES_ON * members[part].0 as f64;
-            self.keep(spots, begin, |spot, part| {
-                spot.above_m > CUT_M && goes_on(part)
-            });
-        }
-        self.keep(spots, begin, |spot, _| spot.above_m < LOW_M);
-        // Stable, so that the order of the scan stays within a part.
-        self.parted.sort_by_key(|(part, spot)| (*part, spot.point));
-        spots.truncate(begin);
-        for part in self.parted.chunk_by(|a, b| a.0 == b.0) {
-            let start = spots.len();
-            spots.extend(part.iter().map(|(_, spot)| *spot));
-            let (count, covered) = members[part[0].0];
-            let mut patch = patch_of(spots, start, scan);
-            patch.goes_on = is_too_tall && covered as f64 >= GOES_ON * count as f64;
-            patches.push(patch);
-        }
+        self.begins = next;
     }
 
-    /// Adds the spots above or below the cells of a part to it, where they are wanted.
-    fn keep(&mut self, spots: &[Spot], begin: usize, is_wanted: impl Fn(&Spot, usize) -> bool) {
-        for spot in &spots[begin..] {
-            let part = self.cell_at(self.cell_of(spot)).map(|cell| self.root(cell));
-            if let Some(part) = part.filter(|part| is_wanted(spot, *part)) {
-                self.parted.push((part, *spot));
-            }
-        }
-    }
-
-    /// The part of a cell: the first of its cells.
-    fn root(&self, mut cell: usize) -> usize {
-        while self.parts[cell].1 != cell {
-            cell = self.parts[cell].1;
-        }
-        cell
-    }
-
-    fn join_neighbours(&mut self) {
-        for cell in 0..self.parts.len() {
-            let [x, y] = self.cells[self.parts[cell].0].0;
-            for neighbour in [[x, y + 1], [x + 1, y - 1], [x + 1, y], [x + 1, y + 1]] {
-                if let Some(other) = self.cell_at(neighbour) {
-                    let (a, b) = (self.root(cell), self.root(other));
-                    self.parts[a.max(b)].1 = a.min(b);
-                }
-            }
-        }
-        for cell in 0..self.parts.len() {
-            self.parts[cell].1 = self.root(cell);
-        }
-    }
-
-    fn cell_at(&self, at: [i32; 2]) -> Option<usize> {
-        self.parts
-            .binary_search_by(|(first, _)| self.cells[*first].0.cmp(&at))
-            .ok()
-    }
-
-    fn cell_of(&self, spot: &Spot) -> [i32; 2] {
-        let cell = |metres: f64| {
-            let cells = metres / self.cell_m;
-            let toward_0 = cells as i32;
-            toward_0 - i32::from(f64::from(toward_0) > cells)
-        };
-        [cell(spot.at_m.x), cell(spot.at_m.y)]
-    }
-
-    /// Marks the cells above which there is more, close to the cut.
-    fn look_up(&self, spots: &[Spot], scan: &Scan, above: &mut [bool]) {
-        for spot in spots {
+    /// Counts the cells of every part, and those above which there is more, close to the cut.
+    fn count_cells(&mut self, spots: &[Spot], scan: &Scan) {
+        let cells = self.floor.places.len();
+        self.covered.clear();
+        self.covered.resize(cells, false);
+        for spot in spots.iter().filter(|spot| spot.above_m > CUT_M) {
             let range_m = f64::from(scan.range_m()[spot.point as usize]);
-            let limit_m = CUT_M + ABOVE_CUT_M.max(ABOVE_CUT_PER_M * range_m);
-            if spot.above_m > CUT_M
-                && spot.above_m < limit_m
-                && let Some(cell) = self.cell_at(self.cell_of(spot))
+            if spot.above_m < CUT_M + ABOVE_CUT_M.max(ABOVE_CUT_PER_M * range_m)
+                && let Some(cell) = self.floor.number(self.floor.place(spot.at_m))
             {
-                above[cell] = true;
+                self.covered[cell] = true;
             }
+        }
+        self.members.clear();
+        self.members.resize(cells, (0, 0));
+        for (part, is_covered) in self.floor.parts.iter().zip(&self.covered) {
+            let (count, covered) = &mut self.members[*part as usize];
+            *count += 1;
+            *covered += usize::from(*is_covered);
+        }
+    }
+
+    /// Finds the part of every spot, and where each part's spots begin.
+    fn assign(&mut self, spots: &[Spot], is_too_tall: bool) {
+        self.part_of.clear();
+        self.begins.clear();
+        self.begins.resize(self.members.len() + 1, 0);
+        for spot in spots {
+            let cell = self.floor.number(self.floor.place(spot.at_m));
+            let part = cell.map(|cell| self.floor.parts[cell]);
+            let part = part.filter(|part| {
+                let (count, covered) = self.members[*part as usize];
+                let goes_on = covered as f64 >= GOES_ON * count as f64;
+                spot.above_m <= CUT_M || (!is_too_tall && goes_on)
+            });
+            if let Some(part) = part {
+                self.begins[part as usize + 1] += 1;
+            }
+            self.part_of.push(part);
+        }
+        for part in 1..self.begins.len() {
+            self.begins[part] += self.begins[part - 1];
         }
     }
 }
