@@ -1,10 +1,11 @@
 //! DBSCAN over the rows of the array.
 
 use super::partition::Partition;
+use super::row::{Centre, Row};
 use super::runs::{Run, Runs};
 use super::window::Windows;
 use super::{ClusterParameters, Clusters};
-use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, Scan};
+use crate::cloud::{MAX_LAYERS, Scan};
 
 /// The cluster step. Its buffers are made once.
 #[derive(Debug, Clone)]
@@ -18,51 +19,27 @@ pub struct Dbscan {
     /// Whether a point is its only neighbour.
     alone: Vec<bool>,
     runs: Runs,
+    /// Number of the run of each core point.
+    run_of: Vec<u32>,
+    /// Runs that belong together, by their numbers.
     partition: Partition,
-    /// Cluster of each representative, while clusters are numbered.
+    /// Cluster of each set's first run, while clusters are numbered.
     numbers: Vec<i32>,
     clusters: Clusters,
-}
-
-/// One layer as a structure of arrays along the columns. Points that are not looked at stand
-/// at infinity, where nothing is their neighbour.
-#[derive(Debug, Clone)]
-struct Row {
-    x_m: Box<[f32; MAX_COLUMNS]>,
-    y_m: Box<[f32; MAX_COLUMNS]>,
-    z_m: Box<[f32; MAX_COLUMNS]>,
-    eps_squared: Box<[f32; MAX_COLUMNS]>,
-}
-
-/// A point with all that its neighbourhood depends on.
-#[derive(Debug, Clone, Copy)]
-struct Centre {
-    column: usize,
-    layer: usize,
-    position_m: [f32; 3],
-    range_m: f32,
-    eps_m: f32,
 }
 
 impl Dbscan {
     /// A cluster step with its buffers.
     pub fn new(parameters: &ClusterParameters) -> Self {
-        let row = || Box::new([0.0; MAX_COLUMNS]);
         Self {
             parameters: parameters.clone(),
             windows: Windows::new(parameters),
-            rows: (0..MAX_LAYERS)
-                .map(|_| Row {
-                    x_m: row(),
-                    y_m: row(),
-                    z_m: row(),
-                    eps_squared: row(),
-                })
-                .collect(),
+            rows: (0..MAX_LAYERS).map(|_| Row::new()).collect(),
             candidates: vec![],
             core: vec![],
             alone: vec![],
             runs: Runs::default(),
+            run_of: vec![],
             partition: Partition::default(),
             numbers: vec![],
             clusters: Clusters::default(),
@@ -91,15 +68,17 @@ impl Dbscan {
         for (point, is_ground) in ground.iter().enumerate().take(scan.len()) {
             let (column, row) = (scan.column(point), &mut self.rows[scan.layer(point)]);
             if !scan.has_return(point) || *is_ground {
-                row.x_m[column] = f32::INFINITY;
+                row.remove(column);
                 continue;
             }
             let eps_m = self.parameters.eps_m(scan.range_m()[point]);
-            row.x_m[column] = scan.x_m()[point];
-            row.y_m[column] = scan.y_m()[point];
-            row.z_m[column] = scan.z_m()[point];
-            row.eps_squared[column] = eps_m * eps_m;
+            row.put(column, scan.point_m(point), eps_m);
             self.candidates.push(point as u32);
+        }
+        // The few are within any window of an exact search.
+        let few = self.windows.clipped(scan.columns());
+        for row in &mut self.rows {
+            row.count_close(scan.columns(), few);
         }
     }
 
@@ -121,22 +100,20 @@ impl Dbscan {
         }
         for point in &self.candidates {
             let point = *point as usize;
-            let centre = self.centre(scan, point);
-            let needed = self.parameters.min_points(centre.range_m);
-            let neighbours = self.neighbours_up_to(&centre, needed);
+            let (column, layer) = (scan.column(point), scan.layer(point));
+            let needed = self.parameters.min_points(scan.range_m()[point]);
+            let mut neighbours = self.rows[layer].close(column);
+            if neighbours < needed {
+                neighbours = self.neighbours_up_to(&self.centre(scan, point), needed);
+            }
             self.core[point] = neighbours >= needed;
+            self.rows[layer].core[column] = neighbours >= needed;
             self.alone[point] = neighbours == 1;
         }
     }
 
-    /// How many neighbours a point has, itself included; counting stops at `needed`. Most
-    /// points on a surface have enough among the next few of their own layer.
+    /// How many neighbours a point has, itself included; counting stops at `needed`.
     fn neighbours_up_to(&self, centre: &Centre, needed: u32) -> u32 {
-        let next_few = self.windows.clipped(needed as usize);
-        let found = self.count(centre, centre.layer, next_few);
-        if found >= needed {
-            return found;
-        }
         let mut found = 0;
         for (layer, reach) in self.layers(centre) {
             found += self.count(centre, layer, reach);
@@ -168,12 +145,14 @@ impl Dbscan {
         within(centre.layer).into_iter().chain(below).chain(above)
     }
 
-    /// Joins core points that are neighbours: first along the layers, then run by run with the
-    /// runs of the same layer and of those above, because neighbours see each other.
+    /// Joins core points that are neighbours: first along the layers, then along the columns,
+    /// then run by run with the runs of the same layer and of those above, because neighbours
+    /// see each other.
     fn join_core_points(&mut self, scan: &Scan) {
-        self.partition.reset(scan.len());
-        self.join_along_layers(scan);
+        self.find_runs(scan);
         let mut partition = std::mem::take(&mut self.partition);
+        partition.reset(self.runs.count());
+        self.join_along_columns(scan, &mut partition);
         for layer in 0..MAX_LAYERS {
             for run in self.runs.of(layer) {
                 self.join_run(scan, &mut partition, layer, run);
@@ -183,25 +162,57 @@ impl Dbscan {
     }
 
     /// Core points of a layer that follow each other within reach are one run.
-    fn join_along_layers(&mut self, scan: &Scan) {
+    fn find_runs(&mut self, scan: &Scan) {
+        self.run_of.resize(scan.len(), 0);
+        self.runs.clear();
         for layer in 0..MAX_LAYERS {
-            let mut last: Option<Centre> = None;
-            self.runs.begin_layer(layer);
+            let mut current: Option<Run> = None;
             for column in 0..scan.columns() {
-                let point = scan.index(column, layer);
-                if !self.core[point] {
+                if !self.rows[layer].core[column] {
                     continue;
                 }
-                let centre = self.centre(scan, point);
-                match last {
-                    Some(last) if self.sees(&last, layer, column) => {
-                        let before = scan.index(last.column, layer);
-                        self.partition.join(point as u32, before as u32);
-                        self.runs.extend(layer, column, centre.range_m);
+                let point = scan.index(column, layer);
+                let (range_m, at_m) = (scan.range_m()[point], scan.point_m(point));
+                let goes_on = current
+                    .as_mut()
+                    .filter(|run| self.follows(scan, layer, run.columns.end - 1, column));
+                if let Some(run) = goes_on {
+                    run.extend(column, range_m, at_m);
+                } else {
+                    if let Some(run) = current.take() {
+                        self.runs.push(layer, run);
                     }
-                    _ => self.runs.begin(layer, column, centre.range_m),
+                    current = Some(Run::of(self.runs.count(), column, range_m, at_m));
                 }
-                last = Some(centre);
+                self.run_of[point] = self.runs.count() as u32;
+            }
+            if let Some(run) = current {
+                self.runs.push(layer, run);
+            }
+        }
+    }
+
+    /// Whether a core point is a neighbour of the one before it in its layer.
+    fn follows(&self, scan: &Scan, layer: usize, last: usize, column: usize) -> bool {
+        if last + 1 == column {
+            return self.rows[layer].follows(column);
+        }
+        let last = self.centre(scan, scan.index(last, layer));
+        self.sees(&last, layer, column)
+    }
+
+    /// Joins the runs that have neighbours in one column of two layers that follow each other.
+    fn join_along_columns(&self, scan: &Scan, partition: &mut Partition) {
+        for (layer, rows) in self.rows.windows(2).enumerate() {
+            let mut last = None;
+            for column in 0..scan.columns() {
+                if !rows[0].meets(&rows[1], column) {
+                    continue;
+                }
+                let runs = [layer, layer + 1].map(|layer| self.run_of[scan.index(column, layer)]);
+                if last.replace(runs) != Some(runs) {
+                    partition.join(runs[0], runs[1]);
+                }
             }
         }
     }
@@ -209,7 +220,6 @@ impl Dbscan {
     /// Joins a run with all others that any of its points has a neighbour in. Its nearest
     /// point reaches farthest.
     fn join_run(&self, scan: &Scan, partition: &mut Partition, layer: usize, run: &Run) {
-        let first = scan.index(run.columns.start, layer) as u32;
         let (near_m, far_m) = (run.low_m, run.high_m);
         let (eps_near_m, eps_far_m) = (self.parameters.eps_m(near_m), self.parameters.eps_m(far_m));
         for other in layer..MAX_LAYERS {
@@ -218,14 +228,11 @@ impl Dbscan {
             };
             for stretch in self.windows.around(&run.columns, reach) {
                 for candidate in self.runs.within(other, &stretch) {
-                    let too_far = candidate.high_m < near_m - eps_far_m
-                        || candidate.low_m > far_m + eps_far_m;
-                    let other_first = scan.index(candidate.columns.start, other) as u32;
-                    if !too_far
-                        && partition.find(first) != partition.find(other_first)
+                    if run.gap_squared(candidate) <= eps_far_m * eps_far_m
+                        && partition.find(run.number) != partition.find(candidate.number)
                         && self.touch(scan, (layer, run), (other, candidate), reach)
                     {
-                        partition.join(first, other_first);
+                        partition.join(run.number, candidate.number);
                     }
                 }
             }
@@ -241,20 +248,27 @@ impl Dbscan {
         (other_layer, other): (usize, &Run),
         reach: usize,
     ) -> bool {
-        let core = |layer: usize| move |column: &usize| self.core[scan.index(*column, layer)];
-        run.columns.clone().filter(core(layer)).any(|column| {
-            let centre = self.centre(scan, scan.index(column, layer));
-            let row = &self.rows[other_layer];
-            let stretches = self.windows.stretches(column, reach, reach);
-            stretches.into_iter().any(|stretch| {
-                let start = stretch.start.max(other.columns.start);
-                let both = start..stretch.end.min(other.columns.end).max(start);
-                row.count(both.clone(), &centre) > 0
-                    && both
-                        .filter(core(other_layer))
-                        .any(|column| row.is_neighbour(column, &centre))
+        let core = |layer: usize| move |column: &usize| self.rows[layer].core[*column];
+        let near = self.windows.around(&other.columns, reach).map(|stretch| {
+            let start = stretch.start.max(run.columns.start);
+            start..stretch.end.min(run.columns.end)
+        });
+        near.into_iter()
+            .flatten()
+            .filter(core(layer))
+            .any(|column| {
+                let centre = self.centre(scan, scan.index(column, layer));
+                let row = &self.rows[other_layer];
+                let stretches = self.windows.stretches(column, reach, reach);
+                stretches.into_iter().any(|stretch| {
+                    let start = stretch.start.max(other.columns.start);
+                    let both = start..stretch.end.min(other.columns.end).max(start);
+                    row.count(both.clone(), &centre) > 0
+                        && both
+                            .filter(core(other_layer))
+                            .any(|column| row.is_neighbour(column, &centre))
+                })
             })
-        })
     }
 
     /// Whether the point in a column is a neighbour of a point and in its window.
@@ -266,7 +280,7 @@ impl Dbscan {
     /// Numbers clusters by their first core point.
     fn number_clusters(&mut self, scan: &Scan) {
         self.numbers.clear();
-        self.numbers.resize(scan.len(), Clusters::NONE);
+        self.numbers.resize(self.runs.count(), Clusters::NONE);
         let labels = &mut self.clusters.labels;
         labels.clear();
         labels.resize(scan.len(), Clusters::NONE);
@@ -276,7 +290,8 @@ impl Dbscan {
             .iter()
             .filter(|point| self.core[**point as usize])
         {
-            let number = &mut self.numbers[self.partition.find(*point) as usize];
+            let run = self.run_of[*point as usize];
+            let number = &mut self.numbers[self.partition.find(run) as usize];
             if *number == Clusters::NONE {
                 *number = clusters;
                 clusters += 1;
@@ -346,43 +361,6 @@ impl Dbscan {
             points[*end] = *point;
             *end += 1;
         }
-    }
-}
-
-impl Row {
-    /// How many points of a stretch are neighbours of a point. Written so that it vectorises.
-    fn count(&self, stretch: std::ops::Range<usize>, centre: &Centre) -> u32 {
-        let [x, y, z] = centre.position_m;
-        let eps_squared = centre.eps_m * centre.eps_m;
-        let points = self.x_m[stretch.clone()]
-            .iter()
-            .zip(&self.y_m[stretch.clone()])
-            .zip(&self.z_m[stretch.clone()])
-            .zip(&self.eps_squared[stretch]);
-        let mut found = 0;
-        for (((x_m, y_m), z_m), other_squared) in points {
-            let (dx, dy, dz) = (x_m - x, y_m - y, z_m - z);
-            let near = dx * dx + dy * dy + dz * dz <= eps_squared.min(*other_squared);
-            found += u32::from(near);
-        }
-        found
-    }
-
-    fn is_neighbour(&self, column: usize, centre: &Centre) -> bool {
-        self.squared_distance(column, centre).is_some()
-    }
-
-    /// Squared distance of the point in a column, if it is a neighbour.
-    fn squared_distance(&self, column: usize, centre: &Centre) -> Option<f32> {
-        let [x, y, z] = centre.position_m;
-        let (dx, dy, dz) = (
-            self.x_m[column] - x,
-            self.y_m[column] - y,
-            self.z_m[column] - z,
-        );
-        let squared = dx * dx + dy * dy + dz * dz;
-        let eps_squared = (centre.eps_m * centre.eps_m).min(self.eps_squared[column]);
-        (squared <= eps_squared).then_some(squared)
     }
 }
 

@@ -2,12 +2,14 @@
 //!
 //! DBSCAN (Ester et al. 1996) without a tree: the array is sorted by azimuth and elevation
 //! already, so that the neighbours of a point stand in a few short stretches of its rows.
-//! `window` says in which, `dbscan` is the algorithm, `partition` joins core points, and `runs`
-//! spare most of the joining.
+//! `window` says in which, `row` compares points along a layer, `dbscan` is the algorithm,
+//! `partition` joins core points, and `runs` spare most of the joining.
 
 mod dbscan;
 
 mod partition;
+
+mod row;
 
 mod runs;
 
