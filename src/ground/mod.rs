@@ -133,6 +133,8 @@ pub struct Ground {
     minima: Minima,
     /// Returns that the plane is refined with.
     near: Vec<Vector3<f64>>,
+    /// Those of them, or of the lowest returns, that lie close to a candidate plane.
+    support: Vec<Vector3<f64>>,
     mask: Vec<bool>,
     surface: Surface,
     heights_m: Vec<f32>,
@@ -158,6 +160,7 @@ impl Ground {
             revolutions: 0,
             minima: Minima::new(parameters.segments, parameters.lowest_per_segment),
             near: Vec::with_capacity(crate::cloud::CAPACITY),
+            support: Vec::with_capacity(crate::cloud::CAPACITY),
             mask: Vec::with_capacity(crate::cloud::CAPACITY),
             surface: Surface::new(SECTORS),
             heights_m: Vec::with_capacity(crate::cloud::CAPACITY),
@@ -188,7 +191,13 @@ impl Ground {
             .gather(scan, &reference, self.parameters.candidate_range_m);
         let mut random = Random::new(self.parameters.seed as u64 ^ self.revolutions << 20);
         let near = followed.filter(|_| self.misses < self.parameters.follow_patience);
-        let found = ransac::find(&self.minima, near.as_ref(), &self.parameters, &mut random);
+        let found = ransac::find(
+            &self.minima,
+            near.as_ref(),
+            &self.parameters,
+            &mut random,
+            &mut self.support,
+        );
         let found = found.map(|plane| {
             let refined = self.refined(scan, plane);
             let is_plausible = ransac::is_plausible(&refined, near.as_ref(), &self.parameters);
@@ -226,7 +235,9 @@ impl Ground {
         (0..self.parameters.refinements).fold(plane, |plane, _| {
             let points = self.near.iter().copied();
             let close = points.filter(|point| libm::fabs(plane.above_m(point)) <= near_m);
-            Plane::fit(close).unwrap_or(plane)
+            self.support.clear();
+            self.support.extend(close);
+            Plane::fit(self.support.iter().copied()).unwrap_or(plane)
         })
     }
 

@@ -11,19 +11,21 @@ use crate::random::Random;
 const DRAWS: usize = 16;
 
 /// The plausible plane with the least error, or `None` if no draw gives a plausible one.
-/// `near` is the plane of the revolution before, if the next one must be close to it.
+/// `near` is the plane of the revolution before, if the next one must be close to it; `support`
+/// is a buffer.
 pub(super) fn find(
     minima: &Minima,
     near: Option<&Plane>,
     parameters: &GroundParameters,
     random: &mut Random,
+    support: &mut Vec<Vector3<f64>>,
 ) -> Option<Plane> {
     if minima.len() < 3 {
         return None;
     }
     let mut best: Option<(f64, Plane)> = None;
     for _ in 0..parameters.iterations {
-        let Some(plane) = candidate(minima, parameters, random) else {
+        let Some(plane) = candidate(minima, parameters, random, support) else {
             continue;
         };
         if !is_plausible(&plane, near, parameters) {
@@ -38,17 +40,23 @@ pub(super) fn find(
 }
 
 /// A plane through three returns, refined by all that lie close to it.
-fn candidate(minima: &Minima, parameters: &GroundParameters, random: &mut Random) -> Option<Plane> {
+fn candidate(
+    minima: &Minima,
+    parameters: &GroundParameters,
+    random: &mut Random,
+    support: &mut Vec<Vector3<f64>>,
+) -> Option<Plane> {
     let [a, b, c] = draw(minima, random)?;
     let drawn = Plane::through(a, b, c)?;
     let supports =
         |point: &Vector3<f64>| drawn.above_m(point).abs() <= parameters.inlier_distance_m;
-    let support = minima.points().filter(supports);
+    support.clear();
+    support.extend(minima.points().filter(supports));
     let needed = (parameters.least_support * minima.len() as f64).max(3.0);
-    if (support.clone().count() as f64) < needed {
+    if (support.len() as f64) < needed {
         return None;
     }
-    Plane::fit(support)
+    Plane::fit(support.iter().copied())
 }
 
 /// Three returns from slices that are not neighbours of each other.
