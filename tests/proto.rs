@@ -154,7 +154,8 @@ fn protobuf_decodes_the_bytes_of_a_status() {
 #[test]
 fn protobuf_decodes_the_bytes_of_a_tile() {
     let mut cells = vec![];
-    encode_cells((0..16).map(|n| n % 5 - 2), 4, &mut cells);
+    let levels: Vec<i16> = (0..16).map(|n| n % 5 - 2).collect();
+    encode_cells(&levels, 4, &mut cells);
     let tile = GridTile {
         tile_x: -3,
         cell_size: 0.1,

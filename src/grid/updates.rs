@@ -1,7 +1,7 @@
 //! Which tiles are sent after a revolution: the most changed, and in turn all.
 
 use super::GridParameters;
-use super::map::{Map, TILE_CELLS, Tile};
+use super::map::{Map, TILE_CELLS, Tile, level};
 use crate::time::Time;
 use crate::wire::grid_tile;
 
@@ -112,12 +112,11 @@ fn encode(tile: &mut Tile, most_bytes: usize) {
     }
     tile.encoded_revision = Some(tile.revision);
     let mut encoded = std::mem::take(&mut tile.encoded);
-    grid_tile::encode_cells(tile.levels(), TILE_CELLS, &mut encoded);
+    let mut levels = tile.log_odds.map(level);
+    grid_tile::encode_cells(&levels, TILE_CELLS, &mut encoded);
     if encoded.len() + AROUND_CELLS > most_bytes {
-        let plain = tile
-            .levels()
-            .map(|level| level.signum() * grid_tile::LEVELS);
-        grid_tile::encode_cells(plain, TILE_CELLS, &mut encoded);
+        levels = levels.map(|level| level.signum() * grid_tile::LEVELS);
+        grid_tile::encode_cells(&levels, TILE_CELLS, &mut encoded);
     }
     tile.encoded = encoded;
 }

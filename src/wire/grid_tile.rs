@@ -85,17 +85,13 @@ pub enum TileError {
     },
 }
 
-/// Writes the levels of a tile's cells, from -[`LEVELS`] to [`LEVELS`], row by row.
-pub fn encode_cells(levels: impl Iterator<Item = i16>, side: usize, out: &mut Vec<u8>) {
-    let mut south = [LEVELS; 1024];
-    let south = &mut south[..side];
+/// Writes the levels of a tile's cells, from -[`LEVELS`] to [`LEVELS`], rows of `side` cells.
+pub fn encode_cells(levels: &[i16], side: usize, out: &mut Vec<u8>) {
     out.clear();
-    let (mut difference, mut count) = (0u64, 0u64);
-    for (cell, level) in levels.enumerate() {
-        let level = level + LEVELS;
-        let below = &mut south[cell % side];
-        let next = (level - *below).rem_euclid(16) as u64;
-        *below = level;
+    let (mut difference, mut count) = (0, 0);
+    for (cell, level) in levels.iter().enumerate() {
+        let south = cell.checked_sub(side).map_or(0, |south| levels[south]);
+        let next = ((level - south) & 15) as u64;
         if next != difference && count > 0 {
             super::protobuf::put_varint(out, count << 4 | difference);
             count = 0;
@@ -195,7 +191,7 @@ mod tests {
 
     fn tile(levels: &[i16], side: usize) -> GridTile {
         let mut cells = vec![];
-        encode_cells(levels.iter().copied(), side, &mut cells);
+        encode_cells(levels, side, &mut cells);
         let tile = GridTile {
             map_id: 7,
             cells_per_side: side as u32,
