@@ -4,12 +4,63 @@
 /// Pairs rows with columns so that the sum of costs is least. Pairs that cost `forbidden` or
 /// more are never made, and leaving a row alone costs `forbidden`. Among equally cheap pairings
 /// the one is taken in which lower rows have lower columns. `cost` is row by row.
+///
+/// Rows and columns that no allowed pairs connect do not concern each other: each such part is
+/// solved for itself.
 pub(super) fn assign(
     rows: usize,
     columns: usize,
     cost: &[f64],
     forbidden: f64,
 ) -> Vec<Option<usize>> {
+    let is_allowed = |row: usize, column: usize| cost[row * columns + column] < forbidden;
+    let mut pairs = vec![None; rows];
+    let (mut is_row_met, mut is_column_met) = (vec![false; rows], vec![false; columns]);
+    let (mut own_rows, mut own_columns, mut own_cost) = (vec![], vec![], vec![]);
+    for first in 0..rows {
+        if std::mem::replace(&mut is_row_met[first], true) {
+            continue;
+        }
+        own_rows.clear();
+        own_columns.clear();
+        own_rows.push(first);
+        let mut next = 0;
+        while let Some(row) = own_rows.get(next).copied() {
+            next += 1;
+            for column in 0..columns {
+                if is_column_met[column] || !is_allowed(row, column) {
+                    continue;
+                }
+                is_column_met[column] = true;
+                own_columns.push(column);
+                for other in 0..rows {
+                    if !is_row_met[other] && is_allowed(other, column) {
+                        is_row_met[other] = true;
+                        own_rows.push(other);
+                    }
+                }
+            }
+        }
+        own_rows.sort_unstable();
+        own_columns.sort_unstable();
+        own_cost.clear();
+        for row in &own_rows {
+            own_cost.extend(
+                own_columns
+                    .iter()
+                    .map(|column| cost[row * columns + column]),
+            );
+        }
+        let own_pairs = assign_all(own_rows.len(), own_columns.len(), &own_cost, forbidden);
+        for (row, column) in own_rows.iter().zip(own_pairs) {
+            pairs[*row] = column.map(|column| own_columns[column]);
+        }
+    }
+    pairs
+}
+
+/// The same, all rows and columns at once.
+fn assign_all(rows: usize, columns: usize, cost: &[f64], forbidden: f64) -> Vec<Option<usize>> {
     // A column of its own for every row stands for being left alone.
     let width = columns + rows;
     let price = |row: usize, column: usize| {
@@ -132,6 +183,21 @@ mod tests {
             taken.sort_unstable();
             taken.dedup();
             assert_eq!(taken.len(), count);
+        }
+    }
+
+    #[test]
+    fn parts_that_nothing_connects_are_paired_as_they_are_among_all() {
+        let mut random = Random::new(5);
+        for _ in 0..50 {
+            let (rows, columns) = (20, 25);
+            let mut price = || match random.uniform() {
+                share if share < 0.08 => 100.0 * share,
+                _ => 1e6,
+            };
+            let cost: Vec<f64> = (0..rows * columns).map(|_| price()).collect();
+            let all = assign_all(rows, columns, &cost, 8.0);
+            assert_eq!(assign(rows, columns, &cost, 8.0), all);
         }
     }
 
