@@ -4,6 +4,8 @@ import struct
 import zlib
 
 UNKNOWN = 7
+# Tiles from another one within which a tile may lie.
+FARTHEST = 500
 
 
 def levels(tile):
@@ -13,7 +15,7 @@ def levels(tile):
         run |= (byte & 127) << shift
         shift += 7
         if byte < 128:
-            for _ in range(min(run >> 4, side * side + 1)):
+            for _ in range(min(run >> 4, side * side + 1 - len(cells))):
                 cells.append(((cells[-side] if len(cells) >= side else UNKNOWN) + run) % 16)
             run = shift = 0
     return cells
@@ -23,14 +25,19 @@ class Drawing:
     """A map as it comes in, tile by tile."""
 
     def __init__(self):
-        self.map_id, self.ended, self.rows, self.side, self.cell = None, set(), {}, 0, 0.0
+        self.map_id, self.rows, self.side, self.cell = None, {}, 0, 0.0
 
     def take(self, tile):
         """Adds a tile. Raises ValueError where it is of a map that has ended, or damaged."""
-        if tile.mapId in self.ended:
+        is_new = self.map_id is None or 0 < (tile.mapId - self.map_id) % 2**32 < 2**31
+        if not is_new and tile.mapId != self.map_id:
             raise ValueError(f"tile of map {tile.mapId}, which has ended; map {self.map_id} is drawn")
         if not (1 <= tile.cellsPerSide <= 1024 and 0.001 <= tile.cellSize <= 100):
             raise ValueError(f"a tile of {tile.cellsPerSide} cells of {tile.cellSize} m a side is impossible")
+        if not is_new and (tile.cellsPerSide, tile.cellSize) != (self.side, self.cell):
+            raise ValueError(f"a tile of {tile.cellsPerSide} cells of {tile.cellSize} m does not fit the map")
+        if not is_new and not self.is_near(tile):
+            raise ValueError(f"tile {tile.tileX}, {tile.tileY} is far from all others")
         if tile.encoding != 1:
             raise ValueError(f"encoding {tile.encoding} is unknown")
         checksum = zlib.crc32(bytes(tile.cells))
@@ -39,13 +46,18 @@ class Drawing:
         cells = levels(tile)
         if len(cells) != tile.cellsPerSide**2 or max(cells) > 14:
             raise ValueError(f"the cells do not fill a tile of {tile.cellsPerSide} cells a side")
-        if tile.mapId != self.map_id:
-            self.ended.add(self.map_id)
+        if is_new:
             self.map_id, self.rows = tile.mapId, {}
             self.side, self.cell = tile.cellsPerSide, tile.cellSize
         self.rows[tile.tileX, tile.tileY] = [
             cells[row * self.side : (row + 1) * self.side] for row in range(self.side)
         ]
+
+    def is_near(self, tile):
+        """Whether it lies within reach of the tiles that are there."""
+        return any(
+            abs(tile.tileX - x) < FARTHEST and abs(tile.tileY - y) < FARTHEST for x, y in self.rows
+        )
 
     def image(self):
         """Rows from the north, cells from the west, and the south-west corner in metres."""

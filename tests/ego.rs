@@ -217,3 +217,36 @@ fn a_mounted_sensor_stands_where_it_is_mounted() {
     assert!((x + 0.5).abs() < 1e-6 && (y - 1.0).abs() < 1e-6);
     assert!((sweep.sensor.yaw_rad.abs() - PI).abs() < 1e-6);
 }
+
+#[test]
+fn a_jump_behind_a_gap_and_a_unit_found_late_begin_a_new_epoch() {
+    let mut ego = ego();
+    for step in 0..100 {
+        hear(&mut ego, 0.01 * f64::from(step), &fix(0.0, 0.0, 0.0));
+    }
+    let before = sweep(&mut ego, 0.99).epoch;
+    // No sweep ends while the pose is lost.
+    hear(&mut ego, 1.53, &fix(25.0, 0.0, 0.0));
+    assert_eq!(sweep(&mut ego, 1.48).epoch, before + 1);
+
+    let mut ego = Ego::new(&EgoParameters::profile(Profile::Default));
+    let mut epochs = vec![];
+    for (step, heading) in [3.0, 3.1, 3.15, 3.3, 3.4].into_iter().enumerate() {
+        let seconds = 0.1 * step as f64;
+        let place = GeodeticWgs84Reading {
+            latitude: GOTHENBURG.latitude_deg,
+            longitude: GOTHENBURG.longitude_deg,
+        };
+        hear(&mut ego, seconds, &place);
+        let heading = GeodeticHeadingReading {
+            north_heading: heading,
+        };
+        hear(&mut ego, seconds, &heading);
+        epochs.push(sweep(&mut ego, seconds).epoch);
+    }
+    assert_eq!(epochs[0], epochs[2]);
+    assert!(
+        epochs[3] > epochs[2] && epochs[4] == epochs[3],
+        "{epochs:?}"
+    );
+}

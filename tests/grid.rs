@@ -385,3 +385,44 @@ fn a_subscriber_that_loses_a_third_of_all_datagrams_has_the_map_after_the_refres
         assert!((bytes as f64) < 60_000.0 * refresh_s, "{bytes}");
     }
 }
+
+#[test]
+fn in_a_drive_all_tiles_come_round_as_often() {
+    let mut drive = Drive::standing();
+    drive.has_poses = true;
+    let mut random = Random::new(2);
+    let world: Vec<Box3> = (0..60)
+        .map(|_| {
+            let side = if random.uniform() < 0.5 { -1.0 } else { 1.0 };
+            let (x, y) = (
+                side * (4.0 + 30.0 * random.uniform()),
+                120.0 * random.uniform(),
+            );
+            let size = 0.3 + 3.0 * random.uniform();
+            [
+                [x, y, 0.0],
+                [x + size, y + size, 0.5 + 2.0 * random.uniform()],
+            ]
+        })
+        .collect();
+    let mut sent = BTreeMap::new();
+    for step in 0..80 {
+        drive.sensor_m = [0.0, 0.8 * f64::from(step)];
+        for tile in drive.revolve(&world) {
+            if step >= 30 {
+                *sent.entry([tile.tile_x, tile.tile_y]).or_insert(0) += 1;
+            }
+        }
+    }
+    // Five seconds, in which these were within reach all the time.
+    let all = drive.pipeline.grid().map().tiles().map(|tile| tile.place());
+    let near = all.filter(|[x, y]| {
+        let [x, y] = [*x, *y].map(|at| (f64::from(at) + 0.5) * 6.4);
+        [24.0, 64.0].iter().all(|from| x.hypot(y - from) < 45.0)
+    });
+    let counts: Vec<i32> = near
+        .map(|place| sent.get(&place).copied().unwrap_or(0))
+        .collect();
+    assert!(counts.len() > 30, "{}", counts.len());
+    assert!(counts.iter().all(|count| *count >= 6), "{counts:?}");
+}

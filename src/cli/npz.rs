@@ -63,7 +63,7 @@ impl Archive {
         for element in elements {
             element.put(&mut array);
         }
-        let options = SimpleFileOptions::default();
+        let options = SimpleFileOptions::default().large_file(array.len() > u32::MAX as usize);
         let result = self.zip.start_file(format!("{name}.npy"), options);
         result
             .map_err(Into::into)

@@ -203,6 +203,10 @@ impl Scan {
     pub fn column_at(&self, azimuth_rad: f64) -> usize {
         let turn_rad = azimuth_rad - self.start_rad;
         let turn_rad = turn_rad - TAU * libm::floor(turn_rad / TAU);
+        let beyond_rad = turn_rad - self.columns as f64 * libm::fabs(self.step_rad);
+        if !self.sensor.sees_all_round() && beyond_rad > 0.5 * (TAU - turn_rad + beyond_rad) {
+            return 0;
+        }
         let column = libm::round(turn_rad / libm::fabs(self.step_rad).max(1e-9)) as usize;
         let column = column.min(self.columns.saturating_sub(1));
         if self.step_rad < 0.0 {

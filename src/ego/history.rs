@@ -54,6 +54,11 @@ impl<T: Blend> History<T> {
         self.values.last().copied()
     }
 
+    /// Whether the last value is too old at a time to be carried on to it.
+    pub(super) fn is_stale(&self, time: Time, limit: Span) -> bool {
+        self.last().is_some_and(|(last, _)| (time - last) > limit)
+    }
+
     /// The value at a time, if one is known no more than `limit` away.
     pub(super) fn at(&self, time: Time, limit: Span) -> Option<T> {
         let after = self.values.partition_point(|(then, _)| *then < time);

@@ -196,6 +196,9 @@ impl Ego {
                 if expected.is_some_and(|from| self.is_far(from, position_m)) {
                     self.places.clear();
                     self.jump(Source::Separate);
+                } else if self.places.is_stale(time, self.limit()) {
+                    self.places.clear();
+                    self.begin_anew(Source::Separate);
                 }
                 self.places.push(time, position_m);
             }
@@ -218,15 +221,18 @@ impl Ego {
             self.is_far(from.position_m, pose.position_m)
                 || self.is_turned(from.yaw_rad, pose.yaw_rad)
         });
+        let is_stale = self.history(source).is_stale(time, limit);
         if jumped {
             self.jump(source);
+        } else if is_stale {
+            self.begin_anew(source);
         }
         let history = match source {
             Source::Applanix => &mut self.applanix,
             Source::Geolocation => &mut self.geolocation,
             Source::Separate | Source::Simulation => &mut self.simulation,
         };
-        if jumped {
+        if jumped || is_stale {
             history.clear();
         }
         history.push(time, pose);
@@ -255,6 +261,11 @@ impl Ego {
     /// A source began anew; that of another one than is used concerns nobody.
     fn jump(&mut self, source: Source) {
         self.jumps += 1;
+        self.begin_anew(source);
+    }
+
+    /// What a source says now cannot be compared with what it said before.
+    fn begin_anew(&mut self, source: Source) {
         if self.current == Some(source) {
             self.epoch = self.epoch.wrapping_add(1);
         }
@@ -276,6 +287,8 @@ impl Ego {
                 // Those before were read as radians.
                 self.headings.clear();
                 self.geolocation.clear();
+                self.begin_anew(Source::Separate);
+                self.begin_anew(Source::Geolocation);
             } else if value < 0.0 {
                 self.heading_unit = HeadingUnit::Radians;
             }

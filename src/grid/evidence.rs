@@ -19,6 +19,8 @@ pub(super) struct Evidence {
     obstacles_m: Vec<[f32; MAX_LAYERS]>,
     /// Of a column's nearest obstacle.
     nearest_m: Vec<f32>,
+    /// Whether the last column stands beside the first.
+    is_round: bool,
 }
 
 /// A stretch of a column's way, seen from above.
@@ -33,7 +35,7 @@ pub(super) struct Stretch {
 pub(super) const NONE_M: f32 = f32::MAX;
 /// Columns to either side in which a surface is looked for that a ray may have missed: one that
 /// was lost on it, or one that found a gap between leaves.
-const BESIDE: usize = 2;
+const BESIDE: isize = 2;
 /// How far before a return its ray is known to be free: returns scatter along the ray.
 const BEFORE_RETURN_M: f32 = 0.05;
 /// How unsure the height of a ray that does not land is for each metre of distance: the tilt of
@@ -51,6 +53,7 @@ impl Evidence {
         parameters: &GridParameters,
     ) {
         self.sensor_m = plane.height_m() as f32;
+        self.is_round = scan.sensor().sees_all_round();
         let (low_m, high_m) = (parameters.obstacle_low_m, parameters.obstacle_high_m);
         let (low_m, high_m) = (low_m as f32, high_m as f32);
         let no_return_m = match parameters.no_return {
@@ -135,7 +138,7 @@ impl Evidence {
     ) {
         let reach_m = parameters.reach_m as f32;
         let (mut nearest_m, mut beside_m) = (reach_m, [NONE_M; MAX_LAYERS]);
-        for column in beside(column, self.nearest_m.len()) {
+        for column in beside(column, self.nearest_m.len(), self.is_round) {
             nearest_m = least(nearest_m, self.nearest_m[column]);
             for (beside_m, return_m) in beside_m.iter_mut().zip(&self.returns_m[column]) {
                 *beside_m = least(*beside_m, *return_m);
@@ -247,11 +250,23 @@ impl<'a> Stretches<'a> {
     }
 }
 
-/// A column and those close beside it, over the seam where the sweep begins.
-fn beside(column: usize, columns: usize) -> impl Iterator<Item = usize> {
-    let wrapped = move |at: usize| if at < columns { at } else { at - columns };
-    let first = column + columns - BESIDE.min(columns);
-    (first..=first + 2 * BESIDE.min(columns)).map(move |at| wrapped(wrapped(at)))
+/// A column and those close beside it, over the seam if there is one.
+fn beside(column: usize, columns: usize, is_round: bool) -> impl Iterator<Item = usize> {
+    let offsets = -BESIDE..=BESIDE;
+    offsets.filter_map(move |offset| {
+        let at = column.wrapping_add_signed(offset);
+        match (at < columns, is_round) {
+            (true, _) => Some(at),
+            (false, false) => None,
+            // Below 0 it wrapped around at the greatest number.
+            (false, true) => Some(if offset < 0 {
+                at.wrapping_add(columns)
+            } else {
+                at - columns
+            }),
+        }
+        .filter(|at| *at < columns)
+    })
 }
 
 #[cfg(test)]
@@ -272,8 +287,16 @@ mod tests {
 
     #[test]
     fn columns_beside_the_seam_are_on_either_side_of_it() {
-        assert_eq!(beside(0, 10).collect::<Vec<_>>(), [8, 9, 0, 1, 2]);
-        assert_eq!(beside(9, 10).collect::<Vec<_>>(), [7, 8, 9, 0, 1]);
-        assert!(beside(0, 1).all(|column| column == 0));
+        let found = |column, columns, is_round| beside(column, columns, is_round).collect();
+        let cases: [(_, &[usize]); 4] = [
+            ((0, 10, true), &[8, 9, 0, 1, 2]),
+            ((9, 10, true), &[7, 8, 9, 0, 1]),
+            ((0, 10, false), &[0, 1, 2]),
+            ((9, 10, false), &[7, 8, 9]),
+        ];
+        for ((column, columns, is_round), expected) in cases {
+            let columns: Vec<usize> = found(column, columns, is_round);
+            assert_eq!(columns, expected);
+        }
     }
 }

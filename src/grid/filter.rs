@@ -24,6 +24,8 @@ pub(super) struct View<'a> {
     pub(super) scan: &'a Scan,
     pub(super) ground: &'a [bool],
     pub(super) evidence: &'a Evidence,
+    /// Of its columns.
+    pub(super) placements: &'a [Placement],
     /// The sensor at the end of the sweep.
     pub(super) sensor: Placement,
     /// Counts the revolutions of the map.
@@ -119,8 +121,12 @@ impl Filter {
 
 /// Whether rays pass through where something of this height was seen.
 fn is_gone(top: u8, at_m: [f64; 2], distance_m: f64, view: &View<'_>) -> bool {
-    let [right_m, ahead_m] = view.sensor.sensor_m(at_m);
-    let column = view.scan.column_at(libm::atan2(right_m, ahead_m));
+    let column_from = |placement: &Placement| {
+        let [right_m, ahead_m] = placement.sensor_m(at_m);
+        view.scan.column_at(libm::atan2(right_m, ahead_m))
+    };
+    // Seen from where the sensor was when it looked there.
+    let column = column_from(&view.placements[column_from(&view.sensor)]);
     let pass_m = view
         .evidence
         .lowest_pass_m(column, distance_m as f32, view.ground);

@@ -33,8 +33,10 @@ pub struct Tile {
     pub(super) change: u32,
     /// Revolution of the last change of a level.
     pub(super) revision: u32,
-    /// When it was sent, if it was.
-    pub(super) sent: Option<Time>,
+    /// Since when it waits: since it was sent, or came into reach.
+    pub(super) waits_from: Option<Time>,
+    /// Whether it was ever sent.
+    pub(super) is_known: bool,
     /// Its cells as they are sent, and the revision that they are of.
     pub(super) encoded: Vec<u8>,
     pub(super) encoded_revision: Option<u32>,
@@ -52,7 +54,8 @@ impl Tile {
             surely_free: [0; TILE_CELLS],
             change: 0,
             revision: 0,
-            sent: None,
+            waits_from: None,
+            is_known: false,
             encoded: vec![],
             encoded_revision: None,
         }
@@ -64,7 +67,8 @@ impl Tile {
         self.top.fill(0);
         self.surely_free.fill(0);
         (self.change, self.revision) = (0, 0);
-        (self.sent, self.encoded_revision) = (None, None);
+        (self.waits_from, self.encoded_revision) = (None, None);
+        self.is_known = false;
     }
 
     /// Sets a cell in a revolution.
@@ -173,6 +177,10 @@ impl Map {
     pub fn tile(&self, place: [i32; 2]) -> Option<&Tile> {
         let tile = self.slots[self.slot(place)].as_deref();
         tile.filter(|tile| tile.place == place)
+    }
+
+    pub(super) fn tiles_mut(&mut self) -> impl Iterator<Item = &mut Tile> {
+        self.slots.iter_mut().flatten().map(|tile| &mut **tile)
     }
 
     /// All tiles.

@@ -73,9 +73,9 @@ parameters! {
         hit_probability: f64 = 0.85, thesis 0.9, in 0.51..=0.99, "";
         /// Probability below which no cell falls, so that what comes to stand there appears
         /// soon.
-        lowest_probability: f64 = 0.1, in 0.001..=0.49, "";
+        lowest_probability: f64 = 0.1, in 0.001..=0.4, "";
         /// Probability above which no cell rises, so that what leaves disappears soon.
-        highest_probability: f64 = 0.96, in 0.51..=0.999, "";
+        highest_probability: f64 = 0.96, in 0.6..=0.999, "";
         /// Height above the ground from which on a return is an obstacle. 0.08 shows kerbs.
         obstacle_low_m: f64 = 0.25, in 0.02..=2.0, "m";
         /// Height above the ground up to which a return is an obstacle. What is higher hangs
@@ -95,14 +95,14 @@ parameters! {
         /// kreisel.GridTile 2022: changed tiles after every revolution, and all tiles in turn.
         publish: bool = true, "";
         /// Most bytes of tiles that are sent, in thousands.
-        budget_kb_per_s: f64 = 100.0, in 1.0..=100000.0, "kB/s";
+        budget_kb_per_s: f64 = 150.0, in 1.0..=100000.0, "kB/s";
         /// Time after which a subscriber that joins late, or loses a third of all datagrams,
-        /// has the whole map within the grid's reach.
+        /// has the whole map within the grid's reach, as far as the budget suffices.
         refresh_s: f64 = 5.0, in 0.2..=600.0, "s";
         /// How often each tile is sent in that time, changed or not.
         refresh_rounds: usize = 8, in 1..=100, "";
         /// A tile whose datagram would be longer is sent with three levels of occupancy
-        /// instead of fifteen.
+        /// instead of fifteen, and in any case whole.
         tile_bytes: usize = 1400, in 200..=65000, "bytes";
     }
 }
@@ -225,6 +225,7 @@ impl Grid {
             scan,
             ground,
             evidence: &self.evidence,
+            placements: &self.placements,
             sensor,
             revolution: self.revolution,
         };
@@ -247,12 +248,14 @@ impl Grid {
         self.epoch = Some(sweep.epoch);
         self.map.clear();
         self.revolution = 0;
-        // Other runs of the service began at other times.
+        // Other runs of the service began at other times. A later map has a greater id, even
+        // where time was set back.
         let from_time = (time.micros() / 10_000) as u32;
-        self.map_id = if from_time == self.map_id {
-            from_time.wrapping_add(1)
-        } else {
+        let is_later = from_time.wrapping_sub(self.map_id) as i32 > 0;
+        self.map_id = if self.map_id == 0 || is_later {
             from_time
+        } else {
+            self.map_id.wrapping_add(1)
         };
     }
 

@@ -82,7 +82,7 @@ impl Window {
             } else {
                 pass_row_clipped(row, enters, leaves);
             }
-            (enters, leaves) = (leaves, leaves + step);
+            (enters, leaves) = (leaves, leaves.saturating_add(step));
         }
         if let Some(row) = last_row {
             let ends = if y1 < top { fixed(x1) } else { leaves };

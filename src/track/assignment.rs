@@ -27,15 +27,15 @@ pub(super) fn assign(
         let mut next = 0;
         while let Some(row) = own_rows.get(next).copied() {
             next += 1;
-            for column in 0..columns {
-                if is_column_met[column] || !is_allowed(row, column) {
+            for (column, is_met) in is_column_met.iter_mut().enumerate() {
+                if *is_met || !is_allowed(row, column) {
                     continue;
                 }
-                is_column_met[column] = true;
+                *is_met = true;
                 own_columns.push(column);
-                for other in 0..rows {
-                    if !is_row_met[other] && is_allowed(other, column) {
-                        is_row_met[other] = true;
+                for (other, is_met) in is_row_met.iter_mut().enumerate() {
+                    if !*is_met && is_allowed(other, column) {
+                        *is_met = true;
                         own_rows.push(other);
                     }
                 }

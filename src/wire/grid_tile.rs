@@ -17,7 +17,7 @@ super::message! {
     /// A square tile of the occupancy grid, to be drawn without any other message: its
     /// south-west corner is at tileX and tileY times cellsPerSide times cellSize in the frame.
     pub struct GridTile = 2022 "kreisel.GridTile" {
-        /// Tells maps apart: tiles of different ones do not fit together.
+        /// Tells maps apart: tiles of different ones do not fit together, a greater one is newer.
         1 => map_id: u32,
         /// Revolution of the map in which a cell last changed.
         2 => revision: u32,
