@@ -35,7 +35,7 @@ pub(super) struct Stretch {
 pub(super) const NONE_M: f32 = f32::MAX;
 /// Columns to either side in which a surface is looked for that a ray may have missed: one that
 /// was lost on it, or one that found a gap between leaves.
-const BESIDE: isize = 2;
+const BESIDE: usize = 2;
 /// How far before a return its ray is known to be free: returns scatter along the ray.
 const BEFORE_RETURN_M: f32 = 0.05;
 /// How unsure the height of a ray that does not land is for each metre of distance: the tilt of
@@ -122,6 +122,11 @@ impl Evidence {
         }
     }
 
+    /// Distance of a column's nearest obstacle.
+    pub(super) fn nearest_m(&self, column: usize) -> f32 {
+        self.nearest_m[column]
+    }
+
     /// Distances of a column's obstacles, by layers; [`NONE_M`] where there is none.
     pub(super) fn obstacles_m(&self, column: usize) -> &[f32; MAX_LAYERS] {
         &self.obstacles_m[column]
@@ -138,11 +143,16 @@ impl Evidence {
     ) {
         let reach_m = parameters.reach_m as f32;
         let (mut nearest_m, mut beside_m) = (reach_m, [NONE_M; MAX_LAYERS]);
-        for column in beside(column, self.nearest_m.len(), self.is_round) {
+        let mut look_beside = |column: usize| {
             nearest_m = least(nearest_m, self.nearest_m[column]);
             for (beside_m, return_m) in beside_m.iter_mut().zip(&self.returns_m[column]) {
                 *beside_m = least(*beside_m, *return_m);
             }
+        };
+        if column >= BESIDE && column + BESIDE < self.nearest_m.len() {
+            (column - BESIDE..=column + BESIDE).for_each(&mut look_beside);
+        } else {
+            beside(column, self.nearest_m.len(), self.is_round).for_each(&mut look_beside);
         }
         let (returns_m, ends_m) = (&self.returns_m[column], &self.ends_m[column]);
         let (from_m, below_m) = self.below(column, parameters.obstacle_high_m as f32);
@@ -162,18 +172,20 @@ impl Evidence {
                 stretches.add(from_m, to_m);
             }
         }
-        if nearest_m < reach_m {
+        let goes_beyond = |layer: usize| (returns_m[layer] < NONE_M) & (ends_m[layer] > nearest_m);
+        if nearest_m < reach_m && (0..MAX_LAYERS).any(goes_beyond) {
             let (from_m, below_m) = self.below(column, parameters.low_pass_m as f32);
             // A ray below an obstacle that higher rays met goes on under it.
             let mut roof_m = reach_m;
             for layer in (0..MAX_LAYERS).rev() {
-                if returns_m[layer] < NONE_M {
-                    let end_m = ends_m[layer].min(below_m[layer]).min(roof_m);
+                if goes_beyond(layer) {
+                    let end_m = least(least(ends_m[layer], below_m[layer]), roof_m);
                     stretches.add(from_m[layer].max(nearest_m), end_m);
                 }
-                roof_m = roof_m.min(self.obstacles_m[column][layer]);
+                roof_m = least(roof_m, self.obstacles_m[column][layer]);
             }
         }
+        stretches.finish();
     }
 
     /// Distances between which each ray of a column is lower than a height.
@@ -216,43 +228,41 @@ fn least(a: f32, b: f32) -> f32 {
 /// first, and so, nearly, in that of their beginnings: what meets the stretch before joins it.
 struct Stretches<'a> {
     passed: &'a mut Vec<Stretch>,
+    last: Stretch,
 }
 
 impl<'a> Stretches<'a> {
     /// With the stretch around the sensor.
     fn new(column: usize, nearest_m: f32, passed: &'a mut Vec<Stretch>) -> Self {
-        passed.push(Stretch {
+        let last = Stretch {
             column,
             from_m: 0.0,
             to_m: nearest_m,
-        });
-        Self { passed }
+        };
+        Self { passed, last }
     }
 
     fn add(&mut self, from_m: f32, to_m: f32) {
         if from_m >= to_m {
             return;
         }
-        let Some(last) = self.passed.last_mut() else {
-            return;
-        };
-        if from_m > last.to_m || to_m < last.from_m {
-            let column = last.column;
-            self.passed.push(Stretch {
-                column,
-                from_m,
-                to_m,
-            });
+        if from_m > self.last.to_m || to_m < self.last.from_m {
+            self.passed.push(self.last);
+            (self.last.from_m, self.last.to_m) = (from_m, to_m);
         } else {
-            last.from_m = last.from_m.min(from_m);
-            last.to_m = last.to_m.max(to_m);
+            self.last.from_m = least(self.last.from_m, from_m);
+            self.last.to_m = -least(-self.last.to_m, -to_m);
         }
+    }
+
+    fn finish(self) {
+        self.passed.push(self.last);
     }
 }
 
 /// A column and those close beside it, over the seam if there is one.
 fn beside(column: usize, columns: usize, is_round: bool) -> impl Iterator<Item = usize> {
-    let offsets = -BESIDE..=BESIDE;
+    let offsets = -(BESIDE as isize)..=BESIDE as isize;
     offsets.filter_map(move |offset| {
         let at = column.wrapping_add_signed(offset);
         match (at < columns, is_round) {
@@ -280,6 +290,7 @@ mod tests {
         for (from_m, to_m) in [(0.5, 2.0), (2.0, 4.0), (3.0, 3.0), (5.0, 6.0), (5.5, 7.0)] {
             stretches.add(from_m, to_m);
         }
+        stretches.finish();
         let ends: Vec<_> = passed.iter().map(|at| (at.from_m, at.to_m)).collect();
         assert_eq!(ends, [(0.0, 4.0), (5.0, 7.0)]);
         assert!(passed.iter().all(|stretch| stretch.column == 3));

@@ -287,7 +287,8 @@ impl Grid {
         self.hits.clear();
         let (per_cell, corner) = (1.0 / self.parameters.cell_m, self.window.corner());
         let reach_m = self.parameters.reach_m as f32;
-        for column in 0..scan.columns() {
+        let within = |column: &usize| self.evidence.nearest_m(*column) <= reach_m;
+        for column in (0..scan.columns()).filter(within) {
             let obstacles_m = self.evidence.obstacles_m(column);
             for (layer, distance_m) in obstacles_m.iter().enumerate() {
                 let point = scan.index(column, layer);
