@@ -39,15 +39,21 @@ def fields(data):
         yield key >> 3, value
 
 
-def clouds(recording):
-    """The point cloud messages of a recording, as dictionaries by field number."""
+def envelopes(recording):
+    """Message number, payload and length in bytes of every envelope of a recording."""
     at = 0
     while at + 5 <= len(recording):
         length = struct.unpack("<I", recording[at + 1 : at + 5])[0] >> 8
         envelope = dict(fields(recording[at + 5 : at + 5 + length]))
         at += 5 + length
-        if envelope[1] >> 1 == POINT_CLOUD:
-            yield dict(fields(envelope[2]))
+        yield envelope[1] >> 1, envelope[2], 5 + length
+
+
+def clouds(recording):
+    """The point cloud messages of a recording, as dictionaries by field number."""
+    for kind, payload, _ in envelopes(recording):
+        if kind == POINT_CLOUD:
+            yield dict(fields(payload))
 
 
 def points(cloud, order):

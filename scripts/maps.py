@@ -4,13 +4,12 @@ import collections
 import json
 import math
 import pathlib
-import struct
 import types
 
 import numpy as np
 from scipy.ndimage import binary_dilation, distance_transform_edt
 
-from clouds import fields
+from clouds import envelopes, fields
 from tiles import UNKNOWN, levels
 
 OBJECT_LIST, GRID_TILE = 2021, 2022
@@ -26,19 +25,15 @@ def unzigzag(value):
 
 def revolutions(recording):
     """For each object list of a recording, the tiles that follow it and the bytes that they take."""
-    at, tiles, size = 0, None, 0
-    while at + 5 <= len(recording):
-        length = struct.unpack("<I", recording[at + 1 : at + 5])[0] >> 8
-        envelope = dict(fields(recording[at + 5 : at + 5 + length]))
-        at += 5 + length
-        kind = unzigzag(envelope[1])
+    tiles, size = None, 0
+    for kind, payload, length in envelopes(recording):
         if kind == OBJECT_LIST:
             if tiles is not None:
                 yield tiles, size
             tiles, size = [], 0
         elif kind == GRID_TILE and tiles is not None:
-            size += 5 + length
-            field = dict(fields(envelope[2]))
+            size += length
+            field = dict(fields(payload))
             place = (unzigzag(field[4]), unzigzag(field[5]))
             tiles.append((place, types.SimpleNamespace(cellsPerSide=field[6], cellSize=field[7], cells=field[10])))
     yield tiles, size

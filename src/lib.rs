@@ -50,6 +50,9 @@ pub mod parameter;
 // Counters by name.
 pub mod tally;
 
+// Comparisons of floats that vectorise.
+mod float;
+
 // Integer microseconds.
 pub mod time;
 

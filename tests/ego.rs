@@ -56,6 +56,16 @@ fn fix(east_m: f64, north_m: f64, heading_deg: f64) -> ApplanixGroup1 {
     }
 }
 
+/// Place and heading in messages of their own.
+fn hear_separately(ego: &mut Ego, seconds: f64, north_heading: f32) {
+    let place = GeodeticWgs84Reading {
+        latitude: GOTHENBURG.latitude_deg,
+        longitude: GOTHENBURG.longitude_deg,
+    };
+    hear(ego, seconds, &place);
+    hear(ego, seconds, &GeodeticHeadingReading { north_heading });
+}
+
 fn yaw_after(unit: HeadingUnit, headings: &[f32]) -> f64 {
     let mut ego = Ego::new(&EgoParameters {
         heading_unit: unit,
@@ -63,15 +73,7 @@ fn yaw_after(unit: HeadingUnit, headings: &[f32]) -> f64 {
     });
     for (step, heading) in headings.iter().enumerate() {
         let seconds = 0.01 * step as f64;
-        let place = GeodeticWgs84Reading {
-            latitude: GOTHENBURG.latitude_deg,
-            longitude: GOTHENBURG.longitude_deg,
-        };
-        hear(&mut ego, seconds, &place);
-        let heading = GeodeticHeadingReading {
-            north_heading: *heading,
-        };
-        hear(&mut ego, seconds, &heading);
+        hear_separately(&mut ego, seconds, *heading);
     }
     sweep(&mut ego, 0.01 * (headings.len() - 1) as f64)
         .vehicle
@@ -233,15 +235,7 @@ fn a_jump_behind_a_gap_and_a_unit_found_late_begin_a_new_epoch() {
     let mut epochs = vec![];
     for (step, heading) in [3.0, 3.1, 3.15, 3.3, 3.4].into_iter().enumerate() {
         let seconds = 0.1 * step as f64;
-        let place = GeodeticWgs84Reading {
-            latitude: GOTHENBURG.latitude_deg,
-            longitude: GOTHENBURG.longitude_deg,
-        };
-        hear(&mut ego, seconds, &place);
-        let heading = GeodeticHeadingReading {
-            north_heading: heading,
-        };
-        hear(&mut ego, seconds, &heading);
+        hear_separately(&mut ego, seconds, heading);
         epochs.push(sweep(&mut ego, seconds).epoch);
     }
     assert_eq!(epochs[0], epochs[2]);

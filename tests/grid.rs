@@ -337,13 +337,12 @@ fn far_behind_the_map_is_forgotten() {
 
 #[test]
 fn without_a_return_a_ray_clears_what_one_wants() {
-    // Rays above the horizon over flat ground come back from nothing, the flat ones from far.
+    // Over flat ground the flattest rays come back from nothing: the ground is too far.
     let free = |choice: kreisel::grid::NoReturn| {
         let mut drive = Drive::with(|configuration| {
             configuration.grid.no_return = choice;
             configuration.grid.no_return_limit_m = 43.0;
         });
-        // A roof far out takes the returns of the ground away.
         drive.revolve_for(5, &[]);
         [40.0, 46.0].map(|y| drive.probability([0.0, y]) < 0.5)
     };

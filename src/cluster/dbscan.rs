@@ -15,7 +15,6 @@ pub struct Dbscan {
     rows: Vec<Row>,
     /// Points that are looked at, in array order.
     candidates: Vec<u32>,
-    core: Vec<bool>,
     /// Whether a point is its only neighbour.
     alone: Vec<bool>,
     runs: Runs,
@@ -36,7 +35,6 @@ impl Dbscan {
             windows: Windows::new(parameters),
             rows: (0..MAX_LAYERS).map(|_| Row::new()).collect(),
             candidates: vec![],
-            core: vec![],
             alone: vec![],
             runs: Runs::default(),
             run_of: vec![],
@@ -94,10 +92,8 @@ impl Dbscan {
     }
 
     fn find_core_points(&mut self, scan: &Scan) {
-        for marks in [&mut self.core, &mut self.alone] {
-            marks.clear();
-            marks.resize(scan.len(), false);
-        }
+        self.alone.clear();
+        self.alone.resize(scan.len(), false);
         for point in &self.candidates {
             let point = *point as usize;
             let (column, layer) = (scan.column(point), scan.layer(point));
@@ -106,7 +102,6 @@ impl Dbscan {
             if neighbours < needed {
                 neighbours = self.neighbours_up_to(&self.centre(scan, point), needed);
             }
-            self.core[point] = neighbours >= needed;
             self.rows[layer].core[column] = neighbours >= needed;
             self.alone[point] = neighbours == 1;
         }
@@ -288,7 +283,7 @@ impl Dbscan {
         for point in self
             .candidates
             .iter()
-            .filter(|point| self.core[**point as usize])
+            .filter(|point| is_core(&self.rows, scan, **point as usize))
         {
             let run = self.run_of[*point as usize];
             let number = &mut self.numbers[self.partition.find(run) as usize];
@@ -307,7 +302,7 @@ impl Dbscan {
     fn adopt_border_points(&mut self, scan: &Scan) {
         for point in &self.candidates {
             let point = *point as usize;
-            if self.core[point] || self.alone[point] {
+            if is_core(&self.rows, scan, point) || self.alone[point] {
                 continue;
             }
             if let Some(core) = self.nearest_core_point(scan, point) {
@@ -324,7 +319,7 @@ impl Dbscan {
                 for column in stretch {
                     let other = scan.index(column, layer);
                     let distance = self.rows[layer].squared_distance(column, &centre);
-                    if let Some(distance) = distance.filter(|_| self.core[other])
+                    if let Some(distance) = distance.filter(|_| self.rows[layer].core[column])
                         && nearest.is_none_or(|best| (distance, other) < best)
                     {
                         nearest = Some((distance, other));
@@ -362,6 +357,10 @@ impl Dbscan {
             *end += 1;
         }
     }
+}
+
+fn is_core(rows: &[Row], scan: &Scan, point: usize) -> bool {
+    rows[scan.layer(point)].core[scan.column(point)]
 }
 
 #[cfg(test)]

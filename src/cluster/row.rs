@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::cloud::MAX_COLUMNS;
+use crate::float::least;
 
 /// The points of a layer that are looked at. The others stand at infinity, where nothing is
 /// their neighbour.
@@ -153,9 +154,4 @@ impl Row {
         let eps_squared = least(self.eps_squared[column], other.eps_squared[column]);
         self.core[column] & other.core[column] && dx * dx + dy * dy + dz * dz <= eps_squared
     }
-}
-
-/// The lesser of two numbers, of which none is NaN.
-pub(super) fn least(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
 }

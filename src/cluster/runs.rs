@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::row::least;
 use crate::cloud::MAX_LAYERS;
+use crate::float::least;
 
 /// Core points of one layer, each a neighbour of the one before.
 #[derive(Debug, Clone)]

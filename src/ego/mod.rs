@@ -1,7 +1,8 @@
 //! Where the vehicle is: its pose at any time, from whatever messages the session has.
 //!
 //! `reading` brings every message to one set of units, `geodesy` WGS84 to the local frame,
-//! `history` reads between and beyond what was heard, `sweep` is the answer. This file chooses among the sources.
+//! `history` reads between and beyond what was heard, `sweep` is the answer. This file chooses
+//! among the sources.
 
 pub mod geodesy;
 

@@ -2,6 +2,7 @@
 
 use super::{GridParameters, NoReturn};
 use crate::cloud::{MAX_LAYERS, Scan};
+use crate::float::least;
 use crate::ground::Plane;
 
 /// The rays of a revolution over the ground, by columns and layers. From the side a ray is
@@ -217,11 +218,6 @@ impl Evidence {
             })
             .fold(f32::MAX, f32::min)
     }
-}
-
-/// The lesser of two numbers, of which none is NaN.
-fn least(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
 }
 
 /// Collects what one column's rays passed. They come in the order of their layers, the lowest
