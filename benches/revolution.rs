@@ -1,26 +1,24 @@
-//! Every stage of the pipeline, and the whole from envelope bytes to envelope bytes, on a real
-//! revolution (where the shared data is), on the simulated roundabout, and on a worst case.
+//! Every step of the pipeline, and the whole from envelope bytes to envelope bytes: on a real
+//! drive (where the shared data is), on the simulated street with its poses, and on a worst case.
+//! The steps are timed where they work, one after the other, with the caches as the others left
+//! them.
 //!
 //! Beside microseconds each figure is given in passes: how often a plain polar-to-Cartesian pass
 //! over the same array would fit into it, measured in the same run, so that figures compare
 //! between machines.
 //!
-//! `cargo bench` prints the table; `cargo bench -- --rounds 200` sets how often each is timed.
+//! `cargo bench` prints the table; `cargo bench -- --rounds 200` sets how many revolutions are
+//! timed, `--input street` takes one input alone, `--reach 50` a grid's reach in metres.
+//! `scripts/bench` counts instructions, too.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::hint::black_box;
 use std::time::Duration;
 
-use kreisel::cloud::{Intake, Scan};
-use kreisel::cluster::Dbscan;
 use kreisel::config::Configuration;
-use kreisel::ego::Sweep;
-use kreisel::grid::{Grid, Perceived};
-use kreisel::ground::Ground;
-use kreisel::pipeline::{Outcome, Pipeline};
+use kreisel::pipeline::{Outcome, Pipeline, Step};
 use kreisel::simulate::{Simulation, scenario};
 use kreisel::time::Time;
-use kreisel::track::Tracker;
 use kreisel::wire::envelope::Postmark;
 use kreisel::wire::point_cloud::CompactPointCloud;
 use kreisel::wire::{Envelope, Recording};
@@ -31,22 +29,15 @@ fn cpu_time() -> Duration {
     Duration::from(nix::time::clock_gettime(clock).unwrap())
 }
 
-/// Median and 99th percentile in microseconds, once everything is warm.
-fn measure(rounds: usize, mut work: impl FnMut(usize)) -> (f64, f64) {
-    work(0);
-    let mut times: Vec<f64> = (1..=rounds)
-        .map(|round| {
-            let begin = cpu_time();
-            work(round);
-            (cpu_time() - begin).as_secs_f64() * 1e6
-        })
-        .collect();
-    times.sort_by(f64::total_cmp);
-    (times[rounds / 2], times[rounds * 99 / 100])
+/// Median and 99th percentile.
+fn quantiles(times_us: &mut [f64]) -> (f64, f64) {
+    times_us.sort_by(f64::total_cmp);
+    let count = times_us.len();
+    (times_us[count / 2], times_us[count * 99 / 100])
 }
 
-/// The unit: distances to x, y, z with tables of sines and cosines, nothing else.
-fn plain_pass(rounds: usize) -> f64 {
+/// The unit in microseconds: distances to x, y, z with tables of sines and cosines, nothing else.
+fn plain_pass() -> f64 {
     const COLUMNS: usize = 1810;
     let ranges: Vec<f32> = (0..COLUMNS * 16).map(|n| (n % 997) as f32 * 0.1).collect();
     let azimuth: Vec<(f32, f32)> = (0..COLUMNS)
@@ -56,7 +47,8 @@ fn plain_pass(rounds: usize) -> f64 {
         .map(|n| (n as f32 * 0.035 - 0.26).sin_cos())
         .collect();
     let mut out = vec![[0.0f32; 3]; ranges.len()];
-    let pass = |_| {
+    let mut pass = || {
+        let begin = cpu_time();
         for (column, (sine, cosine)) in azimuth.iter().enumerate() {
             for (layer, (up, flat)) in elevation.iter().enumerate() {
                 let range = ranges[column * 16 + layer];
@@ -65,12 +57,14 @@ fn plain_pass(rounds: usize) -> f64 {
             }
         }
         black_box(&mut out);
+        (cpu_time() - begin).as_secs_f64() * 1e6
     };
-    measure(rounds, pass).0
+    let mut times_us: Vec<f64> = (0..2000).map(|_| pass()).collect();
+    quantiles(&mut times_us).0
 }
 
-/// Frames of revolutions, one after the other in time.
-fn real() -> Option<Vec<Vec<u8>>> {
+/// Three revolutions of a drive, again and again.
+fn real(rounds: usize) -> Option<Vec<Vec<u8>>> {
     let path = concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/../shared/data/vlp16-sampleShort.rec"
@@ -78,30 +72,37 @@ fn real() -> Option<Vec<Vec<u8>>> {
     let bytes = std::fs::read(path).ok()?;
     // The first message of the recording is the incomplete one of a device that starts.
     let entries = Recording::new(&bytes).skip(1);
-    Some(entries.map(|entry| entry.unwrap().frame.to_vec()).collect())
+    let frames: Vec<_> = entries.map(|entry| entry.unwrap().frame.to_vec()).collect();
+    Some(
+        (0..rounds)
+            .map(|round| at_time(&frames[round % frames.len()], round))
+            .collect(),
+    )
 }
 
-fn simulated() -> Vec<Vec<u8>> {
-    let mut simulation = Simulation::new(scenario::find("roundabout-waiting").unwrap(), 1);
-    let mut revolve = || {
-        let mut frame = vec![];
-        simulation.revolve(&mut frame);
-        frame
-    };
-    (0..20).map(|_| revolve()).collect()
+/// Drives of twenty seconds through the street, each with other traffic.
+fn street(rounds: usize) -> Vec<Vec<u8>> {
+    const REVOLUTIONS: usize = 200;
+    let mut frames = vec![];
+    for seed in 0..rounds.div_ceil(REVOLUTIONS) {
+        let mut simulation = Simulation::new(scenario::find("street").unwrap(), seed as u64 + 1);
+        let mut bytes = vec![];
+        for _ in 0..REVOLUTIONS.min(rounds - seed * REVOLUTIONS) {
+            simulation.revolve(&mut bytes);
+        }
+        frames.extend(Recording::new(&bytes).map(|entry| entry.unwrap().frame.to_vec()));
+    }
+    frames
 }
 
 /// 2,000 columns of 16 returns at all distances, none of them ground.
-fn worst() -> Vec<Vec<u8>> {
-    let distances: Vec<u8> = (0..2000 * 16u32)
-        .flat_map(|n| {
-            (if n % 16 < 8 {
-                100 + n % 16
-            } else {
-                300 + n * 7919 % 2000
-            } as u16)
-                .to_be_bytes()
-        })
+fn worst(rounds: usize) -> Vec<Vec<u8>> {
+    let distance = |n: u32| match n % 16 {
+        layer if layer < 8 => 100 + layer,
+        _ => 300 + n * 7919 % 2000,
+    };
+    let distances: Vec<u8> = (0..2000 * 16)
+        .flat_map(|n| (distance(n) as u16).to_be_bytes())
         .collect();
     let cloud = CompactPointCloud {
         start_azimuth_deg: 0.1,
@@ -111,131 +112,126 @@ fn worst() -> Vec<Vec<u8>> {
         ..CompactPointCloud::default()
     };
     let mut frame = vec![];
-    let sampled = Time::from_micros(1_700_000_000_000_000);
-    Postmark {
-        sampled,
-        ..Postmark::default()
-    }
-    .put_payload(&mut frame, 49, |out| cloud.encode(out));
-    vec![frame]
+    Postmark::default().put_payload(&mut frame, 49, |out| cloud.encode(out));
+    (0..rounds).map(|round| at_time(&frame, round)).collect()
 }
 
-/// The same revolutions again and again, their time going on.
-fn at_time(frame: &[u8], round: usize) -> (CompactPointCloud<'_>, Time) {
+/// A revolution's frame with another time.
+fn at_time(frame: &[u8], round: usize) -> Vec<u8> {
     let (envelope, _) = Envelope::from_datagram(frame).unwrap();
     let cloud = CompactPointCloud::decode(envelope.payload, 0).unwrap();
-    (
-        cloud,
-        Time::from_micros(1_700_000_000_000_000 + 100_000 * round as i64),
-    )
+    let postmark = Postmark {
+        sampled: Time::from_micros(1_700_000_000_000_000 + 100_000 * round as i64),
+        ..Postmark::default()
+    };
+    let mut frame = vec![];
+    postmark.put_payload(&mut frame, 49, |out| cloud.encode(out));
+    frame
 }
 
-fn bench(name: &str, frames: &[Vec<u8>], rounds: usize, unit_us: f64) {
-    let configuration = Configuration::default();
-    let row = |stage: &str, (median_us, p99_us): (f64, f64)| {
-        println!(
-            "| {name} | {stage} | {median_us:.0} | {p99_us:.0} | {:.1} |",
-            median_us / unit_us
-        );
-    };
-    let frame = &frames[frames.len() / 2];
-    let (envelope, _) = Envelope::from_datagram(frame).unwrap();
-    let (cloud, _) = at_time(frame, 0);
-    let mut intake = Intake::default();
-    let revolution = intake
-        .accept(&envelope, cloud, &configuration.cloud)
-        .unwrap();
-    let mut scan = Scan::default();
-    row(
-        "cloud",
-        measure(rounds, |_| {
-            scan.fill(black_box(&revolution), &configuration.cloud)
-        }),
-    );
-    let mut ground = Ground::new(&configuration.ground);
-    let mut report = ground.process(&scan, &[]);
-    row(
-        "ground",
-        measure(rounds, |_| report = ground.process(black_box(&scan), &[])),
-    );
-    let mut dbscan = Dbscan::new(&configuration.cluster);
-    row(
-        "cluster",
-        measure(rounds, |_| {
-            dbscan.process(black_box(&scan), ground.mask());
-        }),
-    );
-    let mut tracker = Tracker::new(&configuration.track);
-    let sweep = Sweep::still(0);
-    row(
-        "track",
-        measure(rounds, |_| {
-            let heights_m = ground.heights_m();
-            tracker.process(
-                black_box(&scan),
-                dbscan.clusters(),
-                heights_m,
-                &report,
-                &sweep,
-            );
-        }),
-    );
-
-    for reach_m in [10.0, 50.0] {
-        let mut parameters = configuration.grid.clone();
-        parameters.reach_m = reach_m;
-        let mut grid = Grid::new(&parameters);
-        row(
-            &format!("grid {reach_m} m"),
-            measure(rounds, |_| {
-                grid.process(&Perceived {
-                    scan: black_box(&scan),
-                    ground: ground.mask(),
-                    heights_m: ground.heights_m(),
-                    plane: &report.plane,
-                    objects: tracker.objects(),
-                    sweep: &sweep,
-                });
-            }),
-        );
+/// Where a counter of instructions is told that a step is done: a function for each, so that it
+/// can be told by name.
+mod mark {
+    macro_rules! marks {
+        ($($name:ident)*) => {
+            $(
+                #[inline(never)]
+                pub(super) fn $name() {
+                    std::hint::black_box(stringify!($name));
+                }
+            )*
+        };
     }
+    marks! { step_begins step_cloud step_ground step_cluster step_track step_grid step_publish }
 
-    let inputs: Vec<Vec<u8>> = (0..=rounds)
-        .map(|round| {
-            let (cloud, sampled) = at_time(&frames[round % frames.len()], round);
-            let mut frame = vec![];
-            let postmark = Postmark {
-                sampled,
-                ..Postmark::default()
+    pub(super) const DONE: [fn(); 5] =
+        [step_cloud, step_ground, step_cluster, step_track, step_grid];
+}
+
+/// Names of what is timed: the pipeline's steps, making the frames, and all of it.
+const NAMES: [&str; 7] = [
+    "cloud", "ground", "cluster", "track", "grid", "publish", "whole",
+];
+/// Revolutions before everything is warm.
+const WARM: usize = 5;
+
+/// Times of every part in microseconds, a list each as in [`NAMES`].
+fn drive(frames: &[Vec<u8>], configuration: &Configuration) -> [Vec<f64>; 7] {
+    let mut pipeline = Pipeline::new(configuration, 0);
+    let mut times_us: [Vec<f64>; 7] = Default::default();
+    for frame in frames {
+        mark::step_begins();
+        let begin = cpu_time();
+        let mut ends = [begin; 6];
+        let (envelope, _) = Envelope::from_datagram(frame).unwrap();
+        let outcome = pipeline.handle_watched(&envelope, |step| {
+            mark::DONE[step as usize]();
+            ends[step as usize] = cpu_time();
+        });
+        match outcome {
+            Ok(Outcome::Revolution(_)) => {}
+            Ok(Outcome::Pose) => continue,
+            other => panic!("{other:?}"),
+        }
+        black_box(pipeline.publish(Time::ZERO, 0.0).count());
+        mark::step_publish();
+        ends[Step::ALL.len()] = cpu_time();
+        let mut from = begin;
+        for (part, end) in ends.into_iter().enumerate() {
+            times_us[part].push((end - from).as_secs_f64() * 1e6);
+            from = end;
+        }
+        times_us[6].push((from - begin).as_secs_f64() * 1e6);
+    }
+    times_us.map(|times_us| times_us[WARM..].to_vec())
+}
+
+fn bench(name: &str, frames: &[Vec<u8>], reaches_m: &[f64], unit_us: f64) {
+    let mut configuration = Configuration::default();
+    for reach_m in reaches_m.iter().copied() {
+        configuration.grid.reach_m = reach_m;
+        let times_us = drive(frames, &configuration);
+        for (part, mut times_us) in NAMES.into_iter().zip(times_us) {
+            let depends_on_reach = ["grid", "publish", "whole"].contains(&part);
+            if !depends_on_reach && reach_m != reaches_m[0] {
+                continue;
+            }
+            let with = if depends_on_reach {
+                format!(", {reach_m} m")
+            } else {
+                String::new()
             };
-            postmark.put_payload(&mut frame, 49, |out| cloud.encode(out));
-            frame
-        })
-        .collect();
-    let mut pipeline = Pipeline::new(&configuration, 0);
-    row(
-        "whole",
-        measure(rounds, |round| {
-            let (envelope, _) = Envelope::from_datagram(&inputs[round]).unwrap();
-            let outcome = pipeline.handle(&envelope);
-            assert!(matches!(outcome, Ok(Outcome::Revolution(_))), "{outcome:?}");
-            black_box(pipeline.publish(Time::ZERO, 0.0).count());
-        }),
-    );
+            let (median_us, p99_us) = quantiles(&mut times_us);
+            let passes = median_us / unit_us;
+            println!("| {name} | {part}{with} | {median_us:.0} | {p99_us:.0} | {passes:.1} |");
+        }
+    }
 }
 
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
-    let given = arguments.iter().position(|argument| argument == "--rounds");
-    let rounds = given.map_or(300, |at| arguments[at + 1].parse().unwrap());
-    let unit_us = plain_pass(10 * rounds);
+    let after = |name: &str| {
+        let at = arguments.iter().position(|argument| argument == name)?;
+        arguments.get(at + 1)
+    };
+    let rounds: usize = after("--rounds").map_or(200, |rounds| rounds.parse().unwrap());
+    let rounds = rounds + WARM;
+    let reaches_m = after("--reach").map_or(vec![10.0, 50.0], |reach| vec![reach.parse().unwrap()]);
+    let is_wanted = |name: &str| after("--input").is_none_or(|input| input == name);
+    let unit_us = plain_pass();
     println!("one plain pass: {unit_us:.1} us");
-    println!("| input | stage | median us | p99 us | passes |");
+    println!("| input | step | median us | p99 us | passes |");
     println!("|-|-|-:|-:|-:|");
-    match real() {
-        Some(frames) => bench("real", &frames, rounds, unit_us),
-        None => eprintln!("skipped: no real recording beside the checkout"),
+    if is_wanted("real") {
+        match real(rounds) {
+            Some(frames) => bench("real", &frames, &reaches_m, unit_us),
+            None => eprintln!("skipped: no real recording beside the checkout"),
+        }
     }
-    bench("roundabout", &simulated(), rounds, unit_us);
-    bench("worst case", &worst(), rounds.min(50), unit_us);
+    if is_wanted("street") {
+        bench("street", &street(rounds), &reaches_m, unit_us);
+    }
+    if is_wanted("worst") {
+        bench("worst", &worst(rounds.min(WARM + 50)), &reaches_m, unit_us);
+    }
 }

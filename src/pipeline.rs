@@ -62,6 +62,32 @@ pub enum Outcome {
     Other,
 }
 
+/// A step that a revolution goes through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Step {
+    /// Bytes to points.
+    Cloud,
+    /// Points to ground and what stands on it.
+    Ground,
+    /// Points to clusters.
+    Cluster,
+    /// Clusters to objects.
+    Track,
+    /// All of them to the map.
+    Grid,
+}
+
+impl Step {
+    /// All of them, in order.
+    pub const ALL: [Self; 5] = [
+        Self::Cloud,
+        Self::Ground,
+        Self::Cluster,
+        Self::Track,
+        Self::Grid,
+    ];
+}
+
 /// What the steps say about a revolution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RevolutionReport {
@@ -175,7 +201,19 @@ impl Pipeline {
     /// [`Fault`] when it is damaged or refused. It is counted, and no track, plane or map hears
     /// of it; what the intake remembers of it costs the next good ones at most one.
     pub fn handle(&mut self, envelope: &Envelope<'_>) -> Result<Outcome, Fault> {
-        let outcome = self.dispatch(envelope);
+        self.handle_watched(envelope, |_| ())
+    }
+
+    /// The same, and says after each step of a revolution which one is done.
+    ///
+    /// # Errors
+    /// As [`Pipeline::handle`].
+    pub fn handle_watched(
+        &mut self,
+        envelope: &Envelope<'_>,
+        done: impl FnMut(Step),
+    ) -> Result<Outcome, Fault> {
+        let outcome = self.dispatch(envelope, done);
         if let Err(fault) = &outcome {
             self.counts.faults.count(fault.name());
             match fault {
@@ -188,7 +226,11 @@ impl Pipeline {
         outcome
     }
 
-    fn dispatch(&mut self, envelope: &Envelope<'_>) -> Result<Outcome, Fault> {
+    fn dispatch(
+        &mut self,
+        envelope: &Envelope<'_>,
+        done: impl FnMut(Step),
+    ) -> Result<Outcome, Fault> {
         let damaged = |error| Fault::Damaged {
             data_type: envelope.data_type,
             error,
@@ -200,7 +242,7 @@ impl Pipeline {
             let accepted = self
                 .intake
                 .accept(envelope, cloud, &self.configuration.cloud)?;
-            return Ok(Outcome::Revolution(self.perceive(&accepted)));
+            return Ok(Outcome::Revolution(self.perceive(&accepted, done)));
         }
         if OWN_IDS.contains(&envelope.data_type) {
             return Ok(Outcome::Own);
@@ -218,23 +260,31 @@ impl Pipeline {
     }
 
     /// One revolution through all the steps.
-    fn perceive(&mut self, revolution: &Revolution<'_>) -> RevolutionReport {
+    fn perceive(
+        &mut self,
+        revolution: &Revolution<'_>,
+        mut done: impl FnMut(Step),
+    ) -> RevolutionReport {
         if revolution.time_jumped {
             self.ground.reset();
             self.tracker.reset();
             self.grid.reset();
         }
         self.scan.fill(revolution, &self.configuration.cloud);
+        done(Step::Cloud);
         let swept = Span::from_seconds(-self.scan.duration_s());
         let sweep = self.ego.sweep(revolution.time + swept, revolution.time);
         self.sweep = sweep;
         let expected = self.tracker.expect(revolution.time, &self.sweep);
         let ground = self.ground.process(&self.scan, expected);
+        done(Step::Ground);
         let clusters = self.clusters.process(&self.scan, self.ground.mask());
+        done(Step::Cluster);
         let heights_m = self.ground.heights_m();
         let objects = self
             .tracker
             .process(&self.scan, clusters, heights_m, &ground, &sweep);
+        done(Step::Track);
         self.grid.process(&Perceived {
             scan: &self.scan,
             ground: self.ground.mask(),
@@ -243,6 +293,7 @@ impl Pipeline {
             objects,
             sweep: &sweep,
         });
+        done(Step::Grid);
 
         let report = RevolutionReport {
             number: self.last.map_or(0, |last| last.number.wrapping_add(1)),
