@@ -5,27 +5,36 @@ use super::window::Window;
 use crate::cloud::Scan;
 use crate::ego::Placement;
 
-/// How rays lie over the cells.
+/// What rays passed, as areas.
+///
+/// A beam is about as wide as the step from column to column (VLP-16 user manual: 3 mrad), so
+/// that the beams of a revolution lie side by side, and what they passed is an area with an
+/// outline. Only the outline is walked along: across the columns where a stretch begins or ends,
+/// and between two columns where one's stretches are not the other's.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Casting {
-    /// How far each column's first stretch, around the sensor, goes on.
-    first_ends_m: Vec<f32>,
+    /// Between the columns, and on either side of all.
+    borders: Vec<Border>,
+    ends_m: Vec<f32>,
 }
 
-/// Halvings of the columns that are looked at: near the sensor all the others are left out.
-const HALVINGS: u32 = 6;
-/// Cells by which the ways of neighbours must go on beyond what they stand for.
-const SPARE_CELLS: f64 = 2.0;
+/// The line from the sensor between two columns, in cells from the window's corner.
+#[derive(Debug, Clone, Copy)]
+struct Border {
+    origin: [f64; 2],
+    per_metre: [f64; 2],
+}
+
+impl Border {
+    fn at(&self, metres: f32) -> [f64; 2] {
+        let metres = f64::from(metres);
+        [0, 1].map(|axis| self.origin[axis] + metres * self.per_metre[axis])
+    }
+}
 
 impl Casting {
-    /// Marks the cells that rays passed on these stretches, which come by column and each
-    /// column's first one first.
-    ///
-    /// Where a ray runs between two others that are less than a cell apart, every cell that it
-    /// crosses is crossed by one of the two: a cell is at least as wide as its side from any
-    /// direction. There it is left out. A beam is nearly as wide as the step from column to
-    /// column (VLP-16 user manual: 3 mrad); where that is more than a cell, it is cast as several
-    /// rays beside each other.
+    /// Marks the cells that rays passed on these stretches. They come by column, each column has
+    /// one, and a column's stretches do not overlap.
     pub(super) fn cast(
         &mut self,
         stretches: &[Stretch],
@@ -34,53 +43,75 @@ impl Casting {
         cell_m: f64,
         window: &mut Window,
     ) {
-        let step_rad = libm::fabs(scan.step_rad()).max(1e-6);
-        let dense_m = cell_m / step_rad;
-        self.first_ends_m.clear();
-        self.first_ends_m.resize(scan.columns(), 0.0);
-        for stretch in stretches.iter().filter(|stretch| stretch.from_m == 0.0) {
-            self.first_ends_m[stretch.column] = stretch.to_m;
+        self.lay_out(scan, placements, cell_m, window.corner());
+        // The area of a half turn does not overlap itself, however the sensor moves meanwhile.
+        let half = stretches.partition_point(|stretch| stretch.column < scan.columns() / 2);
+        let (first, second) = stretches.split_at(half);
+        for half in [first, second] {
+            let mut before: &[Stretch] = &[];
+            for now in half.chunk_by(|a, b| a.column == b.column) {
+                let column = now[0].column;
+                self.outline_between(column, before, now, window);
+                self.outline_across(column, now, window);
+                before = now;
+            }
+            if let Some(last) = before.first() {
+                self.outline_between(last.column + 1, before, &[], window);
+            }
+            window.pass_outlined();
         }
-        let (per_cell, corner) = (1.0 / cell_m, window.corner());
+    }
+
+    fn lay_out(&mut self, scan: &Scan, placements: &[Placement], cell_m: f64, corner: [f64; 2]) {
+        // A chord between two such lines meets the ray between them where it ends.
+        let aside = libm::tan(0.5 * scan.step_rad());
+        let per_cell = 1.0 / cell_m;
+        let border = |column: usize, aside: f64| {
+            let [right, ahead] = scan.direction(column).map(f64::from);
+            let (right, ahead) = (right + aside * ahead, ahead - aside * right);
+            let origin_m = placements[column].origin_m();
+            let ahead_m = placements[column].local_m([right, ahead]);
+            Border {
+                origin: [0, 1].map(|axis| origin_m[axis] * per_cell - corner[axis]),
+                per_metre: [0, 1].map(|axis| (ahead_m[axis] - origin_m[axis]) * per_cell),
+            }
+        };
+        let columns = scan.columns();
+        self.borders.clear();
+        self.borders
+            .extend((0..columns).map(|column| border(column, -aside)));
+        self.borders
+            .extend(columns.checked_sub(1).map(|last| border(last, aside)));
+    }
+
+    /// Where a column's stretches begin and end.
+    fn outline_across(&self, column: usize, stretches: &[Stretch], window: &mut Window) {
+        let [left, right] = [0, 1].map(|side| self.borders[column + side]);
         for stretch in stretches {
-            let column = stretch.column;
-            let [sine, cosine] = scan.direction(column).map(f64::from);
-            let at = |metres: f64, aside: f64| {
-                let (right, ahead) = (sine + aside * cosine, cosine - aside * sine);
-                let at_m = placements[column].local_m([metres * right, metres * ahead]);
-                [0, 1].map(|axis| at_m[axis] * per_cell - corner[axis])
-            };
-            let to_m = f64::from(stretch.to_m);
-            let mut from_m = f64::from(stretch.from_m);
-            if from_m == 0.0 {
-                from_m = self.covered_m(column, dense_m) - SPARE_CELLS * cell_m;
-                from_m = from_m.max(0.0);
-            }
-            if from_m < to_m.min(dense_m) {
-                window.pass(at(from_m, 0.0), at(to_m.min(dense_m), 0.0));
-            }
-            if to_m > dense_m {
-                let beams = libm::ceil(to_m / dense_m) as usize;
-                for beam in 0..beams {
-                    let aside = step_rad * ((beam as f64 + 0.5) / beams as f64 - 0.5);
-                    window.pass(at(from_m.max(dense_m), aside), at(to_m, aside));
-                }
+            for end_m in [stretch.from_m, stretch.to_m] {
+                window.outline(left.at(end_m), right.at(end_m));
             }
         }
     }
 
-    /// Up to where the ways of a column's neighbours stand for its own.
-    fn covered_m(&self, column: usize, dense_m: f64) -> f64 {
-        let halvings = column.trailing_zeros().min(HALVINGS);
-        let apart = 1 << halvings;
-        let beside = [column.checked_sub(apart), Some(column + apart)];
-        beside
-            .map(|beside| {
-                let end_m = beside.and_then(|column| self.first_ends_m.get(column));
-                end_m.map_or(0.0, |end_m| f64::from(*end_m))
-            })
-            .into_iter()
-            .fold(dense_m / (2 * apart) as f64, f64::min)
+    /// What is passed on one side of a border and not on the other. That is where an odd number
+    /// of the ends on both sides lies before.
+    fn outline_between(
+        &mut self,
+        border: usize,
+        left: &[Stretch],
+        right: &[Stretch],
+        window: &mut Window,
+    ) {
+        self.ends_m.clear();
+        for stretch in left.iter().chain(right) {
+            self.ends_m.extend([stretch.from_m, stretch.to_m]);
+        }
+        self.ends_m.sort_unstable_by(f32::total_cmp);
+        let border = self.borders[border];
+        for ends_m in self.ends_m.as_chunks::<2>().0 {
+            window.outline(border.at(ends_m[0]), border.at(ends_m[1]));
+        }
     }
 }
 
@@ -89,55 +120,87 @@ mod tests {
     use super::*;
     use crate::cloud::tests::scan_of;
     use crate::ego::Pose;
-    use crate::grid::map::TILE_CELLS;
     use crate::random::Random;
 
     const CELL_M: f64 = 0.1;
+    const COLUMNS: usize = 1810;
 
-    fn passed(window: &Window) -> Vec<u64> {
-        let side = window.side();
-        let tiles = (0..side * side).map(|tile| (tile % side, tile / side));
-        tiles
-            .flat_map(|(x, y)| (0..TILE_CELLS).map(move |row| window.free(x, y, row)))
-            .collect()
+    fn is_passed(window: &Window, [x, y]: [f64; 2]) -> bool {
+        let (x, y) = (x as usize, y as usize);
+        window.free(x / 64, y / 64, y % 64) >> (x % 64) & 1 == 1
+    }
+
+    /// Every column's stretches: the farthest at 25 m, many gaps where `gaps` is 1.
+    fn stretches(random: &mut Random, gaps: f64) -> Vec<Stretch> {
+        let mut stretches = vec![];
+        for column in 0..COLUMNS {
+            let (mut from_m, mut to_m) = (0.0, 25.0);
+            if (300..500).contains(&column) {
+                to_m = 7.3;
+            }
+            while random.uniform() < gaps * 0.6 && from_m < 24.0 {
+                let end_m = from_m + 5.0 * random.uniform() as f32;
+                stretches.push(Stretch {
+                    column,
+                    from_m,
+                    to_m: end_m,
+                });
+                from_m = end_m + 3.0 * random.uniform() as f32;
+            }
+            if from_m == 0.0 || from_m < to_m {
+                stretches.push(Stretch {
+                    column,
+                    from_m,
+                    to_m,
+                });
+            }
+        }
+        stretches
     }
 
     #[test]
-    fn what_is_left_out_near_the_sensor_marks_no_cell_more_or_less() {
-        let scan = scan_of(1810, |_, _| 100);
-        let placements = vec![Pose::SENSOR.placement(); scan.columns()];
+    fn every_cell_on_a_ray_is_marked_and_none_beside_its_beam() {
+        let scan = scan_of(COLUMNS, |_, _| 100);
         let mut random = Random::new(4);
-        for round in 0..3 {
-            // A few obstacles, each over many columns, and rays that end by chance.
-            let mut ends_m = vec![25.0; scan.columns()];
-            for end_m in &mut ends_m {
-                if random.uniform() < 0.02 * f64::from(round) {
-                    *end_m = 1.0 + 24.0 * random.uniform();
+        for (gaps, moved_m) in [(0.0, 0.0), (0.0, 1.5), (0.1, 0.0), (1.0, 1.5)] {
+            let stretches = stretches(&mut random, gaps);
+            let at_share = |share: f64| Pose {
+                position_m: [share * moved_m, 0.3 * share * moved_m, 0.0],
+                yaw_rad: 0.05 * share * moved_m,
+            };
+            let placements: Vec<_> = (0..COLUMNS)
+                .map(|column| at_share(column as f64 / COLUMNS as f64).placement())
+                .collect();
+            let mut window = Window::new(10);
+            window.begin([-5, -5]);
+            Casting::default().cast(&stretches, &scan, &placements, CELL_M, &mut window);
+            let corner = window.corner();
+            let cells = 10 * 64;
+            let mut near = vec![false; cells * cells];
+            for stretch in &stretches {
+                let [right, ahead] = scan.direction(stretch.column).map(f64::from);
+                // While a column is measured, the sensor moves by less than a millimetre.
+                let (from_m, to_m) = (f64::from(stretch.from_m), f64::from(stretch.to_m) - 1e-3);
+                let steps = ((to_m - from_m) / 0.01) as usize;
+                for step in 0..=steps {
+                    let metres = from_m + (to_m - from_m) * step as f64 / steps.max(1) as f64;
+                    let at_m = placements[stretch.column].local_m([metres * right, metres * ahead]);
+                    let at = [0, 1].map(|axis| at_m[axis] / CELL_M - corner[axis]);
+                    assert!(
+                        is_passed(&window, at),
+                        "{stretch:?} {metres} {gaps} {moved_m}"
+                    );
+                    let [x, y] = at.map(|at| at as usize);
+                    for (x, y) in (y - 2..=y + 2).flat_map(|y| (x - 2..=x + 2).map(move |x| (x, y)))
+                    {
+                        near[y * cells + x] = true;
+                    }
                 }
             }
-            ends_m[300..500].fill(7.3);
-            ends_m[900..930].fill(2.2);
-            let stretch = |(column, end_m): (usize, &f64)| Stretch {
-                column,
-                from_m: 0.0,
-                to_m: *end_m as f32,
-            };
-            let stretches: Vec<_> = ends_m.iter().enumerate().map(stretch).collect();
-            let (mut thinned, mut plain) = (Window::new(10), Window::new(10));
-            thinned.begin([-5, -5]);
-            plain.begin([-5, -5]);
-            let mut casting = Casting::default();
-            casting.cast(&stretches, &scan, &placements, CELL_M, &mut thinned);
-            let corner = plain.corner();
-            for stretch in &stretches {
-                let [sine, cosine] = scan.direction(stretch.column).map(f64::from);
-                let at = |metres: f64| {
-                    let at_m = [metres * sine, metres * cosine];
-                    [0, 1].map(|axis| at_m[axis] / CELL_M - corner[axis])
-                };
-                plain.pass(at(0.0), at(f64::from(stretch.to_m)));
+            for (cell, near) in near.into_iter().enumerate() {
+                let at = [cell % cells, cell / cells].map(|at| at as f64 + 0.5);
+                assert!(near || !is_passed(&window, at), "{at:?} {gaps} {moved_m}");
             }
-            assert_eq!(passed(&thinned), passed(&plain), "{round}");
         }
     }
 }

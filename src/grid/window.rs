@@ -1,5 +1,7 @@
 //! What one revolution saw of the cells around the sensor, a bit each.
 
+use std::ops::Range;
+
 use super::map::TILE_CELLS;
 
 /// Cells that rays passed and cells in which rays ended, in a square of tiles. A word of the
@@ -13,6 +15,10 @@ pub(super) struct Window {
     first_tile: [i32; 2],
     passed: Vec<u64>,
     hit: Vec<u64>,
+    /// Cells at which a row goes into an outlined area or out of it.
+    outlined: Vec<u64>,
+    /// Rows of which that is known.
+    outlined_rows: Range<usize>,
 }
 
 impl Window {
@@ -23,6 +29,8 @@ impl Window {
             first_tile: [0; 2],
             passed: vec![0; words],
             hit: vec![0; words],
+            outlined: vec![0; words],
+            outlined_rows: 0..0,
         }
     }
 
@@ -90,6 +98,54 @@ impl Window {
         }
     }
 
+    /// A straight part of an area's outline, in cells from the south-west corner: its cells are
+    /// passed. When the outline is closed, [`Window::pass_outlined`] passes those within.
+    pub(super) fn outline(&mut self, from: [f64; 2], to: [f64; 2]) {
+        if from == to {
+            return;
+        }
+        self.pass(from, to);
+        let ([x0, y0], [x1, y1]) = if from[1] <= to[1] {
+            (from, to)
+        } else {
+            (to, from)
+        };
+        // A cell that the outline does not cross is within where the middle of its row is: left
+        // of it is an odd number of crossings.
+        let rows = self.cells();
+        let [first, last] = [y0, y1].map(|y| ((y + 0.5).max(0.0) as usize).min(rows));
+        if first == last {
+            return;
+        }
+        let slope = (x1 - x0) / (y1 - y0);
+        for row in first..last {
+            let x = x0 + (row as f64 + 0.5 - y0) * slope;
+            let column = x.max(0.0) as usize;
+            if column < rows {
+                self.outlined[row * self.side + column / TILE_CELLS] ^= 1 << (column % TILE_CELLS);
+            }
+        }
+        self.outlined_rows.start = self.outlined_rows.start.min(first);
+        self.outlined_rows.end = self.outlined_rows.end.max(last);
+    }
+
+    /// Marks the cells within what was outlined, and begins a new outline.
+    pub(super) fn pass_outlined(&mut self) {
+        for row in self.outlined_rows.clone() {
+            let words = row * self.side..(row + 1) * self.side;
+            let mut is_within = 0;
+            for (crossed, passed) in self.outlined[words.clone()]
+                .iter_mut()
+                .zip(&mut self.passed[words])
+            {
+                let within = odd_below(std::mem::take(crossed)) ^ is_within;
+                *passed |= within;
+                is_within = ((within as i64) >> (TILE_CELLS - 1)) as u64;
+            }
+        }
+        self.outlined_rows = self.cells()..0;
+    }
+
     /// Marks the cell in which a ray ended, in cells from the south-west corner. Gives it, or
     /// `None` where it lies outside.
     pub(super) fn hit(&mut self, [x, y]: [f64; 2]) -> Option<Cell> {
@@ -126,6 +182,14 @@ impl Window {
         let word = (y * TILE_CELLS + row) * self.side + x;
         self.passed[word] & !self.hit[word]
     }
+}
+
+/// The bits that have an odd number of ones up to and with themselves.
+fn odd_below(mut bits: u64) -> u64 {
+    for shift in [1, 2, 4, 8, 16, 32] {
+        bits ^= bits << shift;
+    }
+    bits
 }
 
 /// Bits behind the point of places along a row: after a thousand rows they are still right to a
