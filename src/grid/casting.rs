@@ -33,8 +33,8 @@ impl Border {
 }
 
 impl Casting {
-    /// Marks the cells that rays passed on these stretches. They come by column, each column has
-    /// one, and a column's stretches do not overlap.
+    /// Marks the cells that rays passed on these stretches. They come by column, each column's
+    /// first begins at the sensor, and the others do not meet it or each other.
     pub(super) fn cast(
         &mut self,
         stretches: &[Stretch],
@@ -48,6 +48,10 @@ impl Casting {
         let half = stretches.partition_point(|stretch| stretch.column < scan.columns() / 2);
         let (first, second) = stretches.split_at(half);
         for half in [first, second] {
+            let [Some(first), Some(last)] = [half.first(), half.last()] else {
+                continue;
+            };
+            let ends = [first.column, last.column + 1];
             let mut before: &[Stretch] = &[];
             for now in half.chunk_by(|a, b| a.column == b.column) {
                 let column = now[0].column;
@@ -55,9 +59,9 @@ impl Casting {
                 self.outline_across(column, now, window);
                 before = now;
             }
-            if let Some(last) = before.first() {
-                self.outline_between(last.column + 1, before, &[], window);
-            }
+            self.outline_between(ends[1], before, &[], window);
+            let [begin, end] = ends.map(|border| self.borders[border].origin);
+            window.outline(begin, end);
             window.pass_outlined();
         }
     }
@@ -84,13 +88,14 @@ impl Casting {
             .extend(columns.checked_sub(1).map(|last| border(last, aside)));
     }
 
-    /// Where a column's stretches begin and end.
+    /// Where a column's stretches begin, but at the sensor, and where they end.
     fn outline_across(&self, column: usize, stretches: &[Stretch], window: &mut Window) {
         let [left, right] = [0, 1].map(|side| self.borders[column + side]);
-        for stretch in stretches {
-            for end_m in [stretch.from_m, stretch.to_m] {
-                window.outline(left.at(end_m), right.at(end_m));
+        for (place, stretch) in stretches.iter().enumerate() {
+            if place > 0 {
+                window.outline(left.at(stretch.from_m), right.at(stretch.from_m));
             }
+            window.outline(left.at(stretch.to_m), right.at(stretch.to_m));
         }
     }
 
@@ -103,14 +108,18 @@ impl Casting {
         right: &[Stretch],
         window: &mut Window,
     ) {
+        let line = self.borders[border];
+        if let ([left], [right]) = (left, right) {
+            window.outline(line.at(left.to_m), line.at(right.to_m));
+            return;
+        }
         self.ends_m.clear();
         for stretch in left.iter().chain(right) {
             self.ends_m.extend([stretch.from_m, stretch.to_m]);
         }
         self.ends_m.sort_unstable_by(f32::total_cmp);
-        let border = self.borders[border];
         for ends_m in self.ends_m.as_chunks::<2>().0 {
-            window.outline(border.at(ends_m[0]), border.at(ends_m[1]));
+            window.outline(line.at(ends_m[0]), line.at(ends_m[1]));
         }
     }
 }

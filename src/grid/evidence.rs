@@ -1,8 +1,10 @@
 //! From three dimensions to two: what the rays of a column say of the cells below them.
 
+use multiversion::multiversion;
+
 use super::{GridParameters, NoReturn};
 use crate::cloud::{MAX_LAYERS, Scan};
-use crate::float::least;
+use crate::float::{least, least_of};
 use crate::ground::Plane;
 
 /// The rays of a revolution over the ground, by columns and layers. From the side a ray is
@@ -13,15 +15,18 @@ pub(super) struct Evidence {
     sensor_m: f32,
     /// How far each ray is known to go.
     ends_m: Vec<[f32; MAX_LAYERS]>,
-    /// Change of its height for each metre.
-    rises: Vec<[f32; MAX_LAYERS]>,
-    /// Distance of every return, and of every one that is an obstacle.
+    /// Horizontal distance in which it rises by a metre; negative where it falls.
+    runs: Vec<[f32; MAX_LAYERS]>,
+    /// Distance of every return, between the columns beside the first and the last.
     returns_m: Vec<[f32; MAX_LAYERS]>,
+    /// Distance of every return that is an obstacle.
     obstacles_m: Vec<[f32; MAX_LAYERS]>,
-    /// Of a column's nearest obstacle.
+    /// Of a column's nearest obstacle, between the columns beside the first and the last.
     nearest_m: Vec<f32>,
-    /// Whether the last column stands beside the first.
-    is_round: bool,
+    /// How far each ray is known to be free, by itself and by those beside it.
+    free_m: Vec<f32>,
+    /// Distance of the nearest obstacle of a column and those beside it.
+    before_m: Vec<f32>,
 }
 
 /// A stretch of a column's way, seen from above.
@@ -44,88 +49,9 @@ const BEFORE_RETURN_M: f32 = 0.05;
 const UNSURE_PER_M: f32 = 0.02;
 
 impl Evidence {
-    /// Takes a revolution's rays in.
-    pub(super) fn begin(
-        &mut self,
-        scan: &Scan,
-        plane: &Plane,
-        ground: &[bool],
-        heights_m: &[f32],
-        parameters: &GridParameters,
-    ) {
-        self.sensor_m = plane.height_m() as f32;
-        self.is_round = scan.sensor().sees_all_round();
-        let (low_m, high_m) = (parameters.obstacle_low_m, parameters.obstacle_high_m);
-        let (low_m, high_m) = (low_m as f32, high_m as f32);
-        let no_return_m = match parameters.no_return {
-            NoReturn::Clear => parameters.reach_m,
-            NoReturn::Limit => parameters.no_return_limit_m,
-            NoReturn::Ignore => 0.0,
-        } as f32;
-        let normal = plane.normal().map(|part| part as f32);
-        let slopes: [_; MAX_LAYERS] = std::array::from_fn(|layer| scan.slope(layer));
-        let tangents = slopes.map(|(tangent, _)| tangent as f32);
-        let cosines = slopes.map(|(_, cosine)| cosine as f32);
-        for rays in [
-            &mut self.ends_m,
-            &mut self.rises,
-            &mut self.returns_m,
-            &mut self.obstacles_m,
-        ] {
-            rays.clear();
-        }
-        self.nearest_m.clear();
-        let ranges_m = scan.range_m().as_chunks::<MAX_LAYERS>().0;
-        let heights_m = heights_m.as_chunks::<MAX_LAYERS>().0;
-        let ground = ground.as_chunks::<MAX_LAYERS>().0;
-        for (column, ranges_m) in ranges_m.iter().enumerate() {
-            let [sine, cosine] = scan.direction(column);
-            let level = normal[0] * sine + normal[1] * cosine;
-            let mut rises = [0.0; MAX_LAYERS];
-            let mut ends_m = [0.0; MAX_LAYERS];
-            let mut returns_m = [NONE_M; MAX_LAYERS];
-            let mut obstacles_m = [NONE_M; MAX_LAYERS];
-            for layer in 0..MAX_LAYERS {
-                let (range_m, height_m) = (ranges_m[layer], heights_m[column][layer]);
-                let has_return = range_m > 0.0;
-                let distance_m = range_m * cosines[layer];
-                let by_return = (height_m - self.sensor_m) / distance_m;
-                let by_plane = level + normal[2] * tangents[layer];
-                let lands_m = if by_plane < 0.0 {
-                    -self.sensor_m / by_plane
-                } else {
-                    NONE_M
-                };
-                let unseen_m = if range_m == 0.0 {
-                    least(lands_m, no_return_m)
-                } else {
-                    0.0
-                };
-                let is_obstacle = has_return
-                    & !ground[column][layer]
-                    & (height_m >= low_m)
-                    & (height_m <= high_m);
-                rises[layer] = if has_return { by_return } else { by_plane };
-                ends_m[layer] = if has_return {
-                    distance_m - BEFORE_RETURN_M
-                } else {
-                    unseen_m
-                };
-                returns_m[layer] = if has_return { distance_m } else { NONE_M };
-                obstacles_m[layer] = if is_obstacle { distance_m } else { NONE_M };
-            }
-            self.rises.push(rises);
-            self.ends_m.push(ends_m);
-            self.returns_m.push(returns_m);
-            self.obstacles_m.push(obstacles_m);
-            self.nearest_m
-                .push(obstacles_m.into_iter().fold(NONE_M, least));
-        }
-    }
-
     /// Distance of a column's nearest obstacle.
     pub(super) fn nearest_m(&self, column: usize) -> f32 {
-        self.nearest_m[column]
+        self.nearest_m[BESIDE + column]
     }
 
     /// Distances of a column's obstacles, by layers; [`NONE_M`] where there is none.
@@ -133,74 +59,103 @@ impl Evidence {
         &self.obstacles_m[column]
     }
 
+    /// Puts the columns beside the first and the last around them: those on the other side of
+    /// the seam if there is one.
+    fn close(&mut self, is_round: bool) {
+        let columns = self.ends_m.len();
+        for beside in 0..BESIDE {
+            let seam = [
+                (beside, beside + columns),
+                (beside + columns + BESIDE, beside + BESIDE),
+            ];
+            for (at, over) in seam {
+                if is_round && over < self.nearest_m.len() {
+                    self.nearest_m[at] = self.nearest_m[over];
+                    self.returns_m[at] = self.returns_m[over];
+                }
+            }
+        }
+    }
+
+    /// How far each ray is known to be free and lower than a height. A single ray that is lost
+    /// on a surface does not go through it.
+    #[inline(always)]
+    fn look_beside(&mut self, height_m: f32, reach_m: f32) {
+        let until_m = height_m - self.sensor_m;
+        let columns = self.ends_m.len();
+        let layers = columns * MAX_LAYERS;
+        let returns_m = self.returns_m.as_flattened();
+        let beside: [_; 2 * BESIDE + 1] =
+            std::array::from_fn(|column| &returns_m[column * MAX_LAYERS..][..layers]);
+        let (ends_m, runs) = (self.ends_m.as_flattened(), self.runs.as_flattened());
+        self.free_m.resize(layers, 0.0);
+        let free_m = &mut self.free_m[..layers];
+        for ray in 0..layers {
+            let nearest_m = least(
+                least(beside[0][ray], beside[1][ray]),
+                least(beside[3][ray], beside[4][ray]),
+            );
+            let is_lost = beside[BESIDE][ray] == NONE_M;
+            let before_m = if is_lost { nearest_m } else { NONE_M };
+            free_m[ray] = least(least(ends_m[ray], before_m), below_m(until_m, runs[ray]));
+        }
+        let beside: [_; 2 * BESIDE + 1] =
+            std::array::from_fn(|column| &self.nearest_m[column..][..columns]);
+        self.before_m.resize(columns, 0.0);
+        for (column, before_m) in self.before_m[..columns].iter_mut().enumerate() {
+            *before_m = beside
+                .iter()
+                .fold(reach_m, |before_m, beside| least(before_m, beside[column]));
+        }
+    }
+
     /// Where a column's rays are known to have passed low enough to say that nothing is there:
     /// around the sensor, and before the first obstacle where a ray is below the height of what
     /// hangs over the road; behind it only where one came over it and down to the ground again.
-    pub(super) fn passed(
-        &self,
-        column: usize,
-        parameters: &GridParameters,
-        passed: &mut Vec<Stretch>,
-    ) {
+    #[inline(always)]
+    fn pass(&self, column: usize, parameters: &GridParameters, passed: &mut Vec<Stretch>) {
         let reach_m = parameters.reach_m as f32;
-        let (mut nearest_m, mut beside_m) = (reach_m, [NONE_M; MAX_LAYERS]);
-        let mut look_beside = |column: usize| {
-            nearest_m = least(nearest_m, self.nearest_m[column]);
-            for (beside_m, return_m) in beside_m.iter_mut().zip(&self.returns_m[column]) {
-                *beside_m = least(*beside_m, *return_m);
-            }
-        };
-        if column >= BESIDE && column + BESIDE < self.nearest_m.len() {
-            (column - BESIDE..=column + BESIDE).for_each(&mut look_beside);
-        } else {
-            beside(column, self.nearest_m.len(), self.is_round).for_each(&mut look_beside);
-        }
-        let (returns_m, ends_m) = (&self.returns_m[column], &self.ends_m[column]);
-        let (from_m, below_m) = self.below(column, parameters.obstacle_high_m as f32);
-        let mut to_m = [0.0; MAX_LAYERS];
-        for layer in 0..MAX_LAYERS {
-            // A single ray that is lost on a surface does not go through it.
-            let has_return = returns_m[layer] < NONE_M;
-            let before_m = if has_return { NONE_M } else { beside_m[layer] };
-            let end_m = least(least(ends_m[layer], before_m), nearest_m);
-            to_m[layer] = least(end_m, below_m[layer]);
-        }
+        let before_m = self.before_m[column];
+        let free_m = &self.free_m.as_chunks::<MAX_LAYERS>().0[column];
+        let runs = &self.runs[column];
+        let until_m = parameters.obstacle_high_m as f32 - self.sensor_m;
         let mut stretches = Stretches::new(column, parameters.nearest_m as f32, passed);
-        if from_m == [0.0; MAX_LAYERS] {
-            stretches.add(0.0, to_m.into_iter().fold(0.0, f32::max));
+        if until_m >= 0.0 {
+            let farthest_m = -least_of(free_m.map(|free_m| -free_m));
+            stretches.add(0.0, least(farthest_m, before_m));
         } else {
-            for (from_m, to_m) in from_m.into_iter().zip(to_m) {
-                stretches.add(from_m, to_m);
+            for layer in 0..MAX_LAYERS {
+                let from_m = from_m(until_m, runs[layer]);
+                stretches.add(from_m, least(free_m[layer], before_m));
             }
         }
-        let goes_beyond = |layer: usize| (returns_m[layer] < NONE_M) & (ends_m[layer] > nearest_m);
-        if nearest_m < reach_m && (0..MAX_LAYERS).any(goes_beyond) {
-            let (from_m, below_m) = self.below(column, parameters.low_pass_m as f32);
-            // A ray below an obstacle that higher rays met goes on under it.
-            let mut roof_m = reach_m;
-            for layer in (0..MAX_LAYERS).rev() {
-                if goes_beyond(layer) {
-                    let end_m = least(least(ends_m[layer], below_m[layer]), roof_m);
-                    stretches.add(from_m[layer].max(nearest_m), end_m);
-                }
-                roof_m = least(roof_m, self.obstacles_m[column][layer]);
-            }
+        if before_m < reach_m {
+            self.pass_behind(column, before_m, parameters, &mut stretches);
         }
         stretches.finish();
     }
 
-    /// Distances between which each ray of a column is lower than a height.
-    fn below(&self, column: usize, height_m: f32) -> ([f32; MAX_LAYERS], [f32; MAX_LAYERS]) {
-        let until_m = height_m - self.sensor_m;
-        let (mut from_m, mut to_m) = ([0.0; MAX_LAYERS], [0.0; MAX_LAYERS]);
-        for (layer, rise) in self.rises[column].into_iter().enumerate() {
-            let at_m = until_m / rise;
-            let falls = rise < 0.0;
-            from_m[layer] = if falls & (at_m > 0.0) { at_m } else { 0.0 };
-            let rises_to_m = if at_m > 0.0 { at_m } else { 0.0 };
-            to_m[layer] = if falls { NONE_M } else { rises_to_m };
+    /// What a column's rays passed behind its nearest obstacle.
+    fn pass_behind(
+        &self,
+        column: usize,
+        before_m: f32,
+        parameters: &GridParameters,
+        stretches: &mut Stretches<'_>,
+    ) {
+        let (returns_m, obstacles_m) =
+            (&self.returns_m[BESIDE + column], &self.obstacles_m[column]);
+        let (ends_m, runs) = (&self.ends_m[column], &self.runs[column]);
+        let until_m = parameters.low_pass_m as f32 - self.sensor_m;
+        // A ray below an obstacle that higher rays met goes on under it.
+        let mut roof_m = parameters.reach_m as f32;
+        for layer in (0..MAX_LAYERS).rev() {
+            if (returns_m[layer] < NONE_M) & (ends_m[layer] > before_m) {
+                let end_m = least(least(ends_m[layer], below_m(until_m, runs[layer])), roof_m);
+                stretches.add(from_m(until_m, runs[layer]).max(before_m), end_m);
+            }
+            roof_m = least(roof_m, obstacles_m[layer]);
         }
-        (from_m, to_m)
     }
 
     /// Height below which the lowest of a column's rays that go on beyond a distance is, as far
@@ -209,14 +164,135 @@ impl Evidence {
         let ground = &ground[column * MAX_LAYERS..];
         let rays = self.ends_m[column]
             .iter()
-            .zip(&self.rises[column])
+            .zip(&self.runs[column])
             .zip(ground);
         rays.filter(|((end_m, _), _)| **end_m > distance_m)
-            .map(|((_, rise), lands)| {
+            .map(|((_, run), lands)| {
                 let unsure_per_m = if *lands { 0.0 } else { UNSURE_PER_M };
-                self.sensor_m + (rise + unsure_per_m) * distance_m
+                self.sensor_m + (1.0 / run + unsure_per_m) * distance_m
             })
             .fold(f32::MAX, f32::min)
+    }
+}
+
+/// Distance from which on a ray is lower than a height above the sensor.
+#[inline(always)]
+fn from_m(until_m: f32, run: f32) -> f32 {
+    let at_m = until_m * run;
+    if (run < 0.0) & (at_m > 0.0) {
+        at_m
+    } else {
+        0.0
+    }
+}
+
+/// Distance up to which it is.
+#[inline(always)]
+fn below_m(until_m: f32, run: f32) -> f32 {
+    let at_m = until_m * run;
+    let rises_to_m = if at_m > 0.0 { at_m } else { 0.0 };
+    if run < 0.0 { NONE_M } else { rises_to_m }
+}
+
+/// Takes a revolution's rays in.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub(super) fn gather(
+    evidence: &mut Evidence,
+    scan: &Scan,
+    plane: &Plane,
+    ground: &[bool],
+    heights_m: &[f32],
+    parameters: &GridParameters,
+) {
+    evidence.sensor_m = plane.height_m() as f32;
+    let (low_m, high_m) = (parameters.obstacle_low_m, parameters.obstacle_high_m);
+    let (low_m, high_m) = (low_m as f32, high_m as f32);
+    let no_return_m = match parameters.no_return {
+        NoReturn::Clear => parameters.reach_m,
+        NoReturn::Limit => parameters.no_return_limit_m,
+        NoReturn::Ignore => 0.0,
+    } as f32;
+    let normal = plane.normal().map(|part| part as f32);
+    let slopes: [_; MAX_LAYERS] = std::array::from_fn(|layer| scan.slope(layer));
+    let tangents = slopes.map(|(tangent, _)| tangent as f32);
+    let cosines = slopes.map(|(_, cosine)| cosine as f32);
+    for rays in [
+        &mut evidence.ends_m,
+        &mut evidence.runs,
+        &mut evidence.returns_m,
+        &mut evidence.obstacles_m,
+    ] {
+        rays.clear();
+    }
+    evidence.nearest_m.clear();
+    evidence.nearest_m.extend([NONE_M; BESIDE]);
+    evidence.returns_m.extend([[NONE_M; MAX_LAYERS]; BESIDE]);
+    let ranges_m = scan.range_m().as_chunks::<MAX_LAYERS>().0;
+    let heights_m = heights_m.as_chunks::<MAX_LAYERS>().0;
+    let ground = ground.as_chunks::<MAX_LAYERS>().0;
+    for (column, ranges_m) in ranges_m.iter().enumerate() {
+        let [sine, cosine] = scan.direction(column);
+        let level = normal[0] * sine + normal[1] * cosine;
+        let mut runs = [0.0; MAX_LAYERS];
+        let mut ends_m = [0.0; MAX_LAYERS];
+        let mut returns_m = [NONE_M; MAX_LAYERS];
+        let mut obstacles_m = [NONE_M; MAX_LAYERS];
+        for layer in 0..MAX_LAYERS {
+            let (range_m, height_m) = (ranges_m[layer], heights_m[column][layer]);
+            let has_return = range_m > 0.0;
+            let distance_m = range_m * cosines[layer];
+            // Without a return, as the ground lies below it.
+            let rise = level + normal[2] * tangents[layer];
+            let run = if has_return { distance_m } else { 1.0 }
+                / if has_return {
+                    height_m - evidence.sensor_m
+                } else {
+                    rise
+                };
+            let lands_m = if run < 0.0 {
+                -evidence.sensor_m * run
+            } else {
+                NONE_M
+            };
+            let unseen_m = if range_m == 0.0 {
+                least(lands_m, no_return_m)
+            } else {
+                0.0
+            };
+            let is_obstacle =
+                has_return & !ground[column][layer] & (height_m >= low_m) & (height_m <= high_m);
+            runs[layer] = run;
+            ends_m[layer] = if has_return {
+                distance_m - BEFORE_RETURN_M
+            } else {
+                unseen_m
+            };
+            returns_m[layer] = if has_return { distance_m } else { NONE_M };
+            obstacles_m[layer] = if is_obstacle { distance_m } else { NONE_M };
+        }
+        evidence.runs.push(runs);
+        evidence.ends_m.push(ends_m);
+        evidence.returns_m.push(returns_m);
+        evidence.obstacles_m.push(obstacles_m);
+        evidence.nearest_m.push(least_of(obstacles_m));
+    }
+    evidence.nearest_m.extend([NONE_M; BESIDE]);
+    evidence.returns_m.extend([[NONE_M; MAX_LAYERS]; BESIDE]);
+    evidence.close(scan.sensor().sees_all_round());
+}
+
+/// Collects what the rays of every column passed.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub(super) fn stretches(
+    evidence: &mut Evidence,
+    parameters: &GridParameters,
+    passed: &mut Vec<Stretch>,
+) {
+    passed.clear();
+    let (high_m, reach_m) = (parameters.obstacle_high_m, parameters.reach_m);
+    evidence.look_beside(high_m as f32, reach_m as f32);
+    for column in 0..evidence.ends_m.len() {
+        evidence.pass(column, parameters, passed);
     }
 }
 
@@ -281,25 +357,6 @@ impl<'a> Stretches<'a> {
     }
 }
 
-/// A column and those close beside it, over the seam if there is one.
-fn beside(column: usize, columns: usize, is_round: bool) -> impl Iterator<Item = usize> {
-    let offsets = -(BESIDE as isize)..=BESIDE as isize;
-    offsets.filter_map(move |offset| {
-        let at = column.wrapping_add_signed(offset);
-        match (at < columns, is_round) {
-            (true, _) => Some(at),
-            (false, false) => None,
-            // Below 0 it wrapped around at the greatest number.
-            (false, true) => Some(if offset < 0 {
-                at.wrapping_add(columns)
-            } else {
-                at - columns
-            }),
-        }
-        .filter(|at| *at < columns)
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -328,16 +385,25 @@ mod tests {
 
     #[test]
     fn columns_beside_the_seam_are_on_either_side_of_it() {
-        let found = |column, columns, is_round| beside(column, columns, is_round).collect();
-        let cases: [(_, &[usize]); 4] = [
-            ((0, 10, true), &[8, 9, 0, 1, 2]),
-            ((9, 10, true), &[7, 8, 9, 0, 1]),
-            ((0, 10, false), &[0, 1, 2]),
-            ((9, 10, false), &[7, 8, 9]),
-        ];
-        for ((column, columns, is_round), expected) in cases {
-            let columns: Vec<usize> = found(column, columns, is_round);
-            assert_eq!(columns, expected);
-        }
+        let beside = |is_round| {
+            let with = |at: usize| [at as f32; MAX_LAYERS];
+            let mut evidence = Evidence {
+                ends_m: vec![[0.0; MAX_LAYERS]; 10],
+                returns_m: (0..14).map(with).collect(),
+                nearest_m: (0..14).map(|at| at as f32).collect(),
+                ..Evidence::default()
+            };
+            evidence.close(is_round);
+            assert!(
+                evidence
+                    .returns_m
+                    .iter()
+                    .zip(&evidence.nearest_m)
+                    .all(|(a, b)| a[3] == *b)
+            );
+            [0, 1, 12, 13].map(|at| evidence.nearest_m[at])
+        };
+        assert_eq!(beside(true), [10.0, 11.0, 2.0, 3.0]);
+        assert_eq!(beside(false), [0.0, 1.0, 12.0, 13.0]);
     }
 }

@@ -1,18 +1,21 @@
 //! Takes a revolution's evidence into the map: the binary Bayes filter of every cell.
 
+use multiversion::multiversion;
+
 use super::GridParameters;
 use super::evidence::Evidence;
-use super::map::{HEIGHT_UNIT_M, Map, TILE_CELLS, Tile};
+use super::map::{HEIGHT_UNIT_M, Map, TILE_CELLS, Tile, level};
 use super::model::{InverseSensorModel, in_units, log_odds};
 use super::window::{Cell, Window};
 use crate::cloud::Scan;
 use crate::ego::Placement;
+use crate::float::rounded;
 
 /// Log-odds that are added to cells, and their bounds.
 #[derive(Debug, Clone)]
 pub(super) struct Filter {
     /// Of a passed cell by its distance from the sensor in cells.
-    passed: Vec<i16>,
+    passed: Box<[i16; FARTHEST]>,
     hit: i16,
     lowest: i16,
     highest: i16,
@@ -32,6 +35,38 @@ pub(super) struct View<'a> {
     pub(super) revolution: u32,
 }
 
+/// More cells than from the sensor to a corner of the window, whose side is little more than
+/// twice the reach: 120 m of 0.05 m.
+const FARTHEST: usize = 4096;
+
+/// Cells of a row that are taken in together: a vector of log-odds.
+const BLOCK: usize = 16;
+
+/// All bits for the cells of a block whose bit is set, none for the others.
+#[inline(always)]
+fn spread(cells: u16) -> [i16; BLOCK] {
+    let mut spread = [0; BLOCK];
+    for (cell, all) in spread.iter_mut().enumerate() {
+        *all = if cells & (1 << cell) != 0 { -1 } else { 0 };
+    }
+    spread
+}
+
+/// Whether any cell of a block has any bit.
+#[inline(always)]
+fn any(cells: [i16; BLOCK]) -> bool {
+    cells.into_iter().fold(0, |any, cell| any | cell) != 0
+}
+
+/// The set bits, from the lowest on.
+fn set(mut cells: u16) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let cell = cells.trailing_zeros() as usize;
+        cells &= cells.wrapping_sub(1);
+        (cell < BLOCK).then_some(cell)
+    })
+}
+
 /// How far below the top of what was seen in a cell a ray must pass to say that it is gone, and
 /// below which share of its height: windows let rays through, doors do not.
 const BELOW_TOP_M: f32 = 0.15;
@@ -42,13 +77,12 @@ impl Filter {
         let model = InverseSensorModel::new(parameters);
         let cell_m = parameters.cell_m;
         let units = |probability: f64| in_units(log_odds(probability));
-        // From corner to corner of the window, whose side is little more than twice the reach.
-        let farthest = 2.0 * parameters.reach_m / cell_m;
-        let cells = 0..farthest as usize + 4 * TILE_CELLS;
+        let mut passed = Box::new([0; FARTHEST]);
+        for (cell, passed) in passed.iter_mut().enumerate() {
+            *passed = units(model.passed(cell as f64 * cell_m));
+        }
         Self {
-            passed: cells
-                .map(|cell| units(model.passed((cell as f64 + 0.5) * cell_m)))
-                .collect(),
+            passed,
             hit: units(model.hit()),
             lowest: units(parameters.lowest_probability),
             highest: units(parameters.highest_probability),
@@ -56,44 +90,82 @@ impl Filter {
         }
     }
 
-    /// Takes the cells in that rays passed and in which none ended.
-    pub(super) fn free(&self, window: &Window, view: &View<'_>, map: &mut Map) {
-        for y in 0..window.side() {
-            for x in 0..window.side() {
-                let passed = |row: usize| window.free(x, y, row) != 0;
-                if (0..TILE_CELLS).any(passed) {
-                    let tile = map.tile_mut(window.tile(x, y));
-                    for row in 0..TILE_CELLS {
-                        self.free_row(tile, row, window.free(x, y, row), view);
+    #[inline(always)]
+    fn free_row(&self, tile: &mut Tile, row: usize, passed: u64, view: &View<'_>) {
+        let cells = passed & !tile.surely_free[row];
+        if cells == 0 {
+            return;
+        }
+        // Of the row's first cell from the sensor, in cells.
+        let sensor_m = view.sensor.origin_m();
+        let [sensor_x, sensor_y] = sensor_m.map(|at| at / self.cell_m);
+        let middle = |tile: i32| f64::from(tile) * TILE_CELLS as f64 + 0.5;
+        let east = (middle(tile.place[0]) - sensor_x) as f32;
+        let north = (middle(tile.place[1]) + row as f64 - sensor_y) as f32;
+        for block in 0..TILE_CELLS / BLOCK {
+            let mut cells = (cells >> (block * BLOCK)) as u16;
+            if cells == 0 {
+                continue;
+            }
+            let east = east + (block * BLOCK) as f32;
+            let first = row * TILE_CELLS + block * BLOCK;
+            let mut before = [0; BLOCK];
+            before.copy_from_slice(&tile.log_odds[first..first + BLOCK]);
+            if any(before.map(|log_odds| i16::from(log_odds > 0))) {
+                for cell in set(cells).filter(|cell| before[*cell] > 0) {
+                    let place = [f64::from(east) + cell as f64, f64::from(north)];
+                    let at_m = [0, 1].map(|axis| sensor_m[axis] + place[axis] * self.cell_m);
+                    let distance_m = libm::hypot(place[0], place[1]) * self.cell_m;
+                    if !is_gone(tile.top[first + cell], at_m, distance_m, view) {
+                        cells &= !(1 << cell);
                     }
                 }
             }
+            let mut passed = [0; BLOCK];
+            for (cell, passed) in passed.iter_mut().enumerate() {
+                let east = east + cell as f32;
+                *passed = rounded((east * east + north * north).sqrt());
+            }
+            let passed = passed.map(|cells| self.passed[cells as usize % FARTHEST]);
+            self.free_block(tile, first, cells, before, passed, view.revolution);
         }
     }
 
-    fn free_row(&self, tile: &mut Tile, row: usize, passed: u64, view: &View<'_>) {
-        let [sensor_x, sensor_y] = view.sensor.origin_m();
-        let middle = |tile: i32, cell: usize| {
-            (f64::from(tile) * TILE_CELLS as f64 + cell as f64 + 0.5) * self.cell_m
-        };
-        let north_m = middle(tile.place[1], row);
-        let mut cells = passed & !tile.surely_free[row];
-        while cells != 0 {
-            let column = cells.trailing_zeros() as usize;
-            cells &= cells - 1;
-            let east_m = middle(tile.place[0], column);
-            let (right_m, up_m) = (east_m - sensor_x, north_m - sensor_y);
-            let distance_m = libm::sqrt(right_m * right_m + up_m * up_m);
-            let cell = row * TILE_CELLS + column;
-            let before = tile.log_odds[cell];
-            if before > 0 && !is_gone(tile.top[cell], [east_m, north_m], distance_m, view) {
-                continue;
-            }
-            let distance = ((distance_m / self.cell_m) as usize).min(self.passed.len() - 1);
-            let after = (before + self.passed[distance]).max(self.lowest);
-            tile.set(cell, after, view.revolution);
-            if after == self.lowest {
-                tile.surely_free[row] |= 1 << column;
+    /// Adds to those of a block's cells that a bit is set for.
+    #[inline(always)]
+    fn free_block(
+        &self,
+        tile: &mut Tile,
+        first: usize,
+        cells: u16,
+        before: [i16; BLOCK],
+        passed: [i16; BLOCK],
+        revolution: u32,
+    ) {
+        let is_passed = spread(cells);
+        let (mut after, mut is_free, mut is_lowest) = ([0; BLOCK], [0; BLOCK], [0; BLOCK]);
+        let (mut changed, mut turned) = ([0; BLOCK], [0; BLOCK]);
+        for cell in 0..BLOCK {
+            let sum = (before[cell] + (passed[cell] & is_passed[cell])).max(self.lowest);
+            let levels = [before[cell], sum].map(level);
+            let signs = levels.map(i16::signum);
+            changed[cell] = levels[0] ^ levels[1];
+            turned[cell] = i16::from(signs[0] != signs[1]);
+            is_lowest[cell] = is_passed[cell] & i16::from(sum == self.lowest);
+            is_free[cell] = is_passed[cell] & i16::from(sum <= 0);
+            after[cell] = sum;
+        }
+        tile.log_odds[first..first + BLOCK].copy_from_slice(&after);
+        for (is_free, top) in is_free.into_iter().zip(&mut tile.top[first..]) {
+            *top = if is_free != 0 { 0 } else { *top };
+        }
+        if any(changed) {
+            tile.revision = revolution;
+            tile.change += turned.into_iter().sum::<i16>() as u32;
+        }
+        if any(is_lowest) {
+            for cell in set(cells).filter(|cell| is_lowest[*cell] != 0) {
+                tile.surely_free[first / TILE_CELLS] |= 1 << (first % TILE_CELLS + cell);
             }
         }
     }
@@ -115,6 +187,22 @@ impl Filter {
                 tile.surely_free[place / TILE_CELLS] &= !(1 << (place % TILE_CELLS));
             }
             tile.top[place] = tile.top[place].max(*top);
+        }
+    }
+}
+
+/// Takes the cells in that rays passed and in which none ended.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub(super) fn free(filter: &Filter, window: &Window, view: &View<'_>, map: &mut Map) {
+    for y in 0..window.side() {
+        for x in 0..window.side() {
+            let passed = |row: usize| window.free(x, y, row) != 0;
+            if (0..TILE_CELLS).any(passed) {
+                let tile = map.tile_mut(window.tile(x, y));
+                for row in 0..TILE_CELLS {
+                    filter.free_row(tile, row, window.free(x, y, row), view);
+                }
+            }
         }
     }
 }

@@ -13,7 +13,8 @@ const LEVEL_UNITS: i16 = (LEVEL_LOG_ODDS * UNITS) as i16;
 
 /// The level of a cell: 0 unknown, below it free, above it occupied.
 pub(super) fn level(log_odds: i16) -> i16 {
-    let nearest = (log_odds + LEVEL_UNITS / 2).div_euclid(LEVEL_UNITS);
+    const { assert!(LEVEL_UNITS.count_ones() == 1) };
+    let nearest = (log_odds + LEVEL_UNITS / 2) >> LEVEL_UNITS.trailing_zeros();
     nearest.clamp(-LEVELS, LEVELS)
 }
 

@@ -217,8 +217,14 @@ impl Grid {
         let half = (self.window.side() / 2) as i32;
         self.window.begin(home.map(|tile| tile - half));
         sweep.placements(scan.columns(), &mut self.placements);
-        self.evidence
-            .begin(scan, plane, ground, heights_m, &self.parameters);
+        evidence::gather(
+            &mut self.evidence,
+            scan,
+            plane,
+            ground,
+            heights_m,
+            &self.parameters,
+        );
         self.mark_returns(perceived);
         self.mark_passed(scan);
         let view = View {
@@ -229,7 +235,7 @@ impl Grid {
             sensor,
             revolution: self.revolution,
         };
-        self.filter.free(&self.window, &view, &mut self.map);
+        filter::free(&self.filter, &self.window, &view, &mut self.map);
         self.filter
             .occupy(&self.hits, &mut self.window, self.revolution, &mut self.map);
         let cell_m = self.parameters.cell_m;
@@ -308,11 +314,7 @@ impl Grid {
 
     /// Marks the cells that rays passed.
     fn mark_passed(&mut self, scan: &Scan) {
-        self.passed.clear();
-        for column in 0..scan.columns() {
-            self.evidence
-                .passed(column, &self.parameters, &mut self.passed);
-        }
+        evidence::stretches(&mut self.evidence, &self.parameters, &mut self.passed);
         self.casting.cast(
             &self.passed,
             scan,

@@ -114,7 +114,10 @@ fn encode(tile: &mut Tile, most_bytes: usize) {
     }
     tile.encoded_revision = Some(tile.revision);
     let mut encoded = std::mem::take(&mut tile.encoded);
-    let mut levels = tile.log_odds.map(level);
+    let mut levels = [0; TILE_CELLS * TILE_CELLS];
+    for (level_of, log_odds) in levels.iter_mut().zip(&tile.log_odds) {
+        *level_of = level(*log_odds);
+    }
     grid_tile::encode_cells(&levels, TILE_CELLS, &mut encoded);
     if encoded.len() + AROUND_CELLS > most_bytes {
         levels = levels.map(|level| level.signum() * grid_tile::LEVELS);

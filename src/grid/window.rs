@@ -15,10 +15,10 @@ pub(super) struct Window {
     first_tile: [i32; 2],
     passed: Vec<u64>,
     hit: Vec<u64>,
-    /// Cells at which a row goes into an outlined area or out of it.
-    outlined: Vec<u64>,
-    /// Rows of which that is known.
-    outlined_rows: Range<usize>,
+    /// Cells at whose southern edge an outline comes into their row.
+    crossed: Vec<u64>,
+    /// Rows that have such cells.
+    crossed_rows: Range<usize>,
 }
 
 impl Window {
@@ -29,8 +29,8 @@ impl Window {
             first_tile: [0; 2],
             passed: vec![0; words],
             hit: vec![0; words],
-            outlined: vec![0; words],
-            outlined_rows: 0..0,
+            crossed: vec![0; words],
+            crossed_rows: words..0,
         }
     }
 
@@ -62,88 +62,76 @@ impl Window {
             .map(|tile| f64::from(tile) * TILE_CELLS as f64)
     }
 
-    /// Marks every cell that a straight way crosses, in cells from the south-west corner. Row by
-    /// row, all cells between where the way enters the row and where it leaves it: none is left
-    /// out. What lies outside is left out.
-    pub(super) fn pass(&mut self, from: [f64; 2], to: [f64; 2]) {
+    /// Passes along a straight part of an area's outline, in cells from the south-west corner:
+    /// row by row, all cells between where it enters the row and where it leaves it, none left
+    /// out but those outside. When the outline is closed, [`Window::pass_outlined`] passes the
+    /// cells within.
+    pub(super) fn outline(&mut self, from: [f64; 2], to: [f64; 2]) {
         let ([x0, y0], [x1, y1]) = if from[1] <= to[1] {
             (from, to)
         } else {
             (to, from)
         };
-        let slope = if y1 > y0 { (x1 - x0) / (y1 - y0) } else { 0.0 };
         let top = self.cells() as f64;
-        if y1 < 0.0 || y0 >= top {
+        if !(y1 >= 0.0 && y0 < top) {
             return;
         }
         let (first, last) = (y0.max(0.0) as usize, y1.min(top - 1.0) as usize);
+        let is_inside = x0.min(x1) >= 0.0 && x0.max(x1) < top;
+        if is_inside && first == last && y0 >= 0.0 && y1 < top {
+            pass_row(self.passed_row(first), fixed(x0), fixed(x1));
+            return;
+        }
+        let slope = if y1 > y0 { (x1 - x0) / (y1 - y0) } else { 0.0 };
         let step = fixed(slope);
         let mut enters = fixed(x0 + (first as f64 - y0).max(0.0) * slope);
         let mut leaves = fixed(x0 + ((first + 1) as f64 - y0) * slope);
-        let is_inside = x0.min(x1) >= 0.0 && x0.max(x1) < top;
-        let mut rows =
-            self.passed[first * self.side..(last + 1) * self.side].chunks_exact_mut(self.side);
-        let last_row = rows.next_back();
-        for row in rows {
-            if is_inside {
-                pass_row(row, enters, leaves);
+        for row in first..=last {
+            // A cell that no outline crosses is within if an odd number of outlines passes the
+            // row's southern edge to the left of it.
+            if row > first || y0 < 0.0 {
+                self.cross(row, enters);
+            }
+            if row == last && y1 < top {
+                leaves = fixed(x1);
+            }
+            if is_inside && row < last {
+                pass_row(self.passed_row(row), enters, leaves);
             } else {
-                pass_row_clipped(row, enters, leaves);
+                pass_row_clipped(self.passed_row(row), enters, leaves);
             }
             (enters, leaves) = (leaves, leaves.saturating_add(step));
         }
-        if let Some(row) = last_row {
-            let ends = if y1 < top { fixed(x1) } else { leaves };
-            pass_row_clipped(row, enters, ends);
-        }
     }
 
-    /// A straight part of an area's outline, in cells from the south-west corner: its cells are
-    /// passed. When the outline is closed, [`Window::pass_outlined`] passes those within.
-    pub(super) fn outline(&mut self, from: [f64; 2], to: [f64; 2]) {
-        if from == to {
-            return;
+    fn passed_row(&mut self, row: usize) -> &mut [u64] {
+        &mut self.passed[row * self.side..(row + 1) * self.side]
+    }
+
+    /// An outline crosses the southern edge of a row.
+    fn cross(&mut self, row: usize, x: i64) {
+        let column = (x.max(0) >> FRACTION_BITS) as usize;
+        if column < self.cells() {
+            let word = row * self.side + column / TILE_CELLS;
+            self.crossed[word] ^= 1 << (column % TILE_CELLS);
         }
-        self.pass(from, to);
-        let ([x0, y0], [x1, y1]) = if from[1] <= to[1] {
-            (from, to)
-        } else {
-            (to, from)
-        };
-        // A cell that the outline does not cross is within where the middle of its row is: left
-        // of it is an odd number of crossings.
-        let rows = self.cells();
-        let [first, last] = [y0, y1].map(|y| ((y + 0.5).max(0.0) as usize).min(rows));
-        if first == last {
-            return;
-        }
-        let slope = (x1 - x0) / (y1 - y0);
-        for row in first..last {
-            let x = x0 + (row as f64 + 0.5 - y0) * slope;
-            let column = x.max(0.0) as usize;
-            if column < rows {
-                self.outlined[row * self.side + column / TILE_CELLS] ^= 1 << (column % TILE_CELLS);
-            }
-        }
-        self.outlined_rows.start = self.outlined_rows.start.min(first);
-        self.outlined_rows.end = self.outlined_rows.end.max(last);
+        self.crossed_rows.start = self.crossed_rows.start.min(row);
+        self.crossed_rows.end = self.crossed_rows.end.max(row + 1);
     }
 
     /// Marks the cells within what was outlined, and begins a new outline.
     pub(super) fn pass_outlined(&mut self) {
-        for row in self.outlined_rows.clone() {
+        for row in self.crossed_rows.clone() {
             let words = row * self.side..(row + 1) * self.side;
+            let crossed = &mut self.crossed[words.clone()];
             let mut is_within = 0;
-            for (crossed, passed) in self.outlined[words.clone()]
-                .iter_mut()
-                .zip(&mut self.passed[words])
-            {
+            for (crossed, passed) in crossed.iter_mut().zip(&mut self.passed[words]) {
                 let within = odd_below(std::mem::take(crossed)) ^ is_within;
                 *passed |= within;
                 is_within = ((within as i64) >> (TILE_CELLS - 1)) as u64;
             }
         }
-        self.outlined_rows = self.cells()..0;
+        self.crossed_rows = self.cells()..0;
     }
 
     /// Marks the cell in which a ray ended, in cells from the south-west corner. Gives it, or
@@ -275,7 +263,7 @@ mod tests {
             let mut place = || [130.0 * random.uniform(), 127.9 * random.uniform()];
             let (from, to) = (place(), place());
             window.begin([0, 0]);
-            window.pass(from, to);
+            window.outline(from, to);
             let marked = passed(&window);
             for cell in &marked {
                 assert!(length_within(*cell, from, to) > -1e-6, "{cell:?}");
@@ -299,7 +287,7 @@ mod tests {
             ([60.5, 0.5], [70.5, 0.5], 11),
         ] {
             let mut window = Window::new(2);
-            window.pass(from, to);
+            window.outline(from, to);
             assert_eq!(passed(&window).len(), expected, "{from:?}");
         }
     }
@@ -307,10 +295,10 @@ mod tests {
     #[test]
     fn what_lies_outside_is_left_out() {
         let mut window = Window::new(1);
-        window.pass([-30.5, -30.0], [100.0, 100.5]);
+        window.outline([-30.5, -30.0], [100.0, 100.5]);
         let across = passed(&window);
         window.begin([5, 5]);
-        window.pass([0.0, 0.5], [63.5, 64.0]);
+        window.outline([0.0, 0.5], [63.5, 64.0]);
         assert_eq!(across, passed(&window));
         window.begin([5, 5]);
         for (from, to) in [
@@ -319,7 +307,7 @@ mod tests {
             ([3.0, 64.0], [60.0, 99.0]),
             ([3.0, -64.0], [60.0, -9.0]),
         ] {
-            window.pass(from, to);
+            window.outline(from, to);
         }
         assert_eq!(passed(&window).len(), 0);
         for outside in [[-0.1, 3.0], [64.0, 3.0], [3.0, f64::NAN]] {
@@ -330,7 +318,7 @@ mod tests {
     #[test]
     fn a_return_counts_once_and_outweighs_the_rays_that_pass() {
         let mut window = Window::new(1);
-        window.pass([0.5, 0.5], [10.5, 0.5]);
+        window.outline([0.5, 0.5], [10.5, 0.5]);
         let cell = window.hit([4.2, 0.9]).unwrap();
         assert_eq!(window.hit([4.8, 0.1]), Some(cell));
         assert_eq!(window.free(0, 0, 0), 0b111_1110_1111);

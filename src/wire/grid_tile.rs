@@ -89,14 +89,22 @@ pub enum TileError {
 pub fn encode_cells(levels: &[i16], side: usize, out: &mut Vec<u8>) {
     out.clear();
     let (mut difference, mut count) = (0, 0);
-    for (cell, level) in levels.iter().enumerate() {
-        let south = cell.checked_sub(side).map_or(0, |south| levels[south]);
-        let next = ((level - south) & 15) as u64;
-        if next != difference && count > 0 {
-            super::protobuf::put_varint(out, count << 4 | difference);
-            count = 0;
+    let none = vec![0; side];
+    let mut south = &none[..];
+    for row in levels.chunks(side) {
+        if difference == 0 && row == south {
+            count += side as u64;
+            continue;
         }
-        (difference, count) = (next, count + 1);
+        for (level, south) in row.iter().zip(south) {
+            let next = ((level - south) & 15) as u64;
+            if next != difference && count > 0 {
+                super::protobuf::put_varint(out, count << 4 | difference);
+                count = 0;
+            }
+            (difference, count) = (next, count + 1);
+        }
+        south = row;
     }
     super::protobuf::put_varint(out, count << 4 | difference);
 }
