@@ -109,6 +109,8 @@ pub struct Map {
     side: i32,
     slots: Vec<Option<Box<Tile>>>,
     spare: Vec<Box<Tile>>,
+    /// The tile around which the others are kept.
+    home: Option<[i32; 2]>,
 }
 
 impl Map {
@@ -118,6 +120,7 @@ impl Map {
             side: side as i32,
             slots: vec![None; side * side],
             spare: vec![],
+            home: None,
         }
     }
 
@@ -132,7 +135,11 @@ impl Map {
     }
 
     /// Forgets tiles more than half of the map's side away from one of them.
-    pub(super) fn keep_around(&mut self, [x, y]: [i32; 2]) {
+    pub(super) fn keep_around(&mut self, home: [i32; 2]) {
+        if self.home.replace(home) == Some(home) {
+            return;
+        }
+        let [x, y] = home;
         let half = self.side / 2;
         for slot in &mut self.slots {
             let is_far = |tile: &Tile| {
