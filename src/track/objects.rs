@@ -17,6 +17,8 @@ use crate::time::{Span, Time};
 pub(super) struct ObjectTracker {
     next_id: u32,
     tracks: Vec<Track>,
+    /// Of which nothing was left, but which may be seen again.
+    lost: Vec<Track>,
     objects: Vec<Object>,
     grouping: Grouping,
     outline: Vec<[f64; 2]>,
@@ -35,6 +37,7 @@ const FARTHEST_LEAP_M: f64 = 6.0;
 impl ObjectTracker {
     pub(super) fn reset(&mut self) {
         self.tracks.clear();
+        self.lost.clear();
         self.objects.clear();
     }
 
@@ -66,7 +69,7 @@ impl ObjectTracker {
         let (old, new) = (from.placement(), to.placement());
         let turn_rad = wrapped_rad(to.yaw_rad - from.yaw_rad);
         let rise_m = to.position_m[2] - from.position_m[2];
-        for track in &mut self.tracks {
+        for track in self.tracks.iter_mut().chain(&mut self.lost) {
             track.reframe(turn_rad, |at| new.local_m(old.sensor_m(at)), rise_m);
         }
     }
@@ -84,7 +87,7 @@ impl ObjectTracker {
         let pairs = self.pair(parameters);
         self.update(&pairs, scene, end);
         self.begin(&pairs, scene, end, parameters);
-        self.tidy(parameters);
+        self.tidy(end, parameters);
         self.publish(end, parameters);
     }
 
@@ -193,34 +196,68 @@ impl ObjectTracker {
     }
 
     /// Drops what is gone, and the younger of two that stand in one place.
-    fn tidy(&mut self, parameters: &TrackParameters) {
-        self.tracks.retain(|track| !track.is_gone(parameters));
+    fn tidy(&mut self, end: Time, parameters: &TrackParameters) {
+        self.lost.retain(|track| track.may_return(end));
+        let gone = self
+            .tracks
+            .extract_if(.., |track| track.is_gone(parameters));
+        self.lost.extend(gone.filter(|track| track.may_return(end)));
         let places: Vec<(Rectangle, f64)> = self
             .tracks
             .iter()
             .map(|track| (track.rectangle(), track.odds()))
             .collect();
         let mut number = 0;
-        self.tracks.retain(|track| {
+        let doubled = self.tracks.extract_if(.., |track| {
             let own = number;
             number += 1;
             let centre_m = places[own].0.centre_m;
-            let doubled = places.iter().enumerate().any(|(other, (place, odds))| {
+            places.iter().enumerate().any(|(other, (place, odds))| {
                 let within_m = -0.3 * place.width_m.min(1.6);
                 let is_better =
                     (*odds, std::cmp::Reverse(other)) > (track.odds(), std::cmp::Reverse(own));
                 other != own && is_better && place.outline().distance_m(centre_m) < within_m
-            });
-            !doubled
+            })
         });
+        self.lost
+            .extend(doubled.filter(|track| track.may_return(end)));
     }
 
     fn publish(&mut self, end: Time, parameters: &TrackParameters) {
         self.objects.clear();
-        let all = self.tracks.iter().map(|track| track.object(end));
-        self.objects
-            .extend(all.filter(|object| object.existence >= parameters.least_confidence));
+        let is_due = |track: &Track| {
+            !track.is_published && track.object(end).existence >= parameters.least_confidence
+        };
+        for number in 0..self.tracks.len() {
+            if is_due(&self.tracks[number]) {
+                self.reunite(number);
+            }
+        }
+        for track in &mut self.tracks {
+            let object = track.object(end);
+            if object.existence >= parameters.least_confidence {
+                track.is_published = true;
+                self.objects.push(object);
+            }
+        }
         self.objects.sort_by_key(|object| object.id);
+    }
+
+    /// Gives a track that is to be published for the first time the id of one that was lost, or
+    /// of which nothing is seen now.
+    fn reunite(&mut self, number: usize) {
+        let new = &self.tracks[number];
+        let known = self.lost.iter().chain(&self.tracks).enumerate();
+        let missed = known.filter(|(place, known)| *place < self.lost.len() || known.is_missed());
+        let off = missed.filter_map(|(place, known)| Some((new.off_from_m(known)?, place)));
+        let Some((_, place)) = off.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+            return;
+        };
+        let lost = match place.checked_sub(self.lost.len()) {
+            None => self.lost.swap_remove(place),
+            Some(unseen) => self.tracks[unseen].give_up(),
+        };
+        self.tracks[number].take_over(&lost);
     }
 }
 

@@ -2,6 +2,10 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+mod published;
+
+mod reunion;
+
 use super::class::{Belief, Qualities};
 use super::existence::Existence;
 use super::look::{Look, View};
@@ -10,16 +14,14 @@ use super::shape::{Shape, fitted_yaw};
 use super::sight::Sight;
 use super::spots::Spot;
 use super::trail::Trails;
-use super::{Object, Rectangle, TrackParameters};
+use super::{Rectangle, TrackParameters};
 use crate::time::{Span, Time};
+use reunion::Parting;
 
 /// Standard deviation of the velocity of something seen for the first time.
 const BIRTH_MPS: f64 = 6.0;
 /// Noise of a box's middle beside that of its edges, because its shape is not a box.
 const MIDDLE_M: f64 = 0.08;
-
-/// An object that is farther than this from where it is said to be is not there.
-const THERE_M: f64 = 2.0;
 
 /// Returns below which an object may be no cluster in the next revolution.
 const SPARSE: usize = 16;
@@ -54,6 +56,10 @@ pub(super) struct Track {
     range_m: f64,
     is_hidden: bool,
     floor_z_m: f64,
+    /// Where and how fast it was when it was last measured.
+    parted: Parting,
+    /// Whether others know its id.
+    pub(super) is_published: bool,
 }
 
 impl Track {
@@ -90,6 +96,8 @@ impl Track {
             range_m: look.range_m,
             is_hidden: false,
             floor_z_m,
+            parted: Parting::default(),
+            is_published: false,
         };
         track.belief = Belief::of(&track.qualities());
         let view = look.view(spots, track.shape.yaw_rad);
@@ -97,6 +105,7 @@ impl Track {
         track.trails.begin(centre_m);
         track.born_m = centre_m;
         track.motion = Motion::new(centre_m, noise, BIRTH_MPS);
+        track.parted = Parting::of(&track.motion.estimate(), look.points);
         track
     }
 
@@ -245,6 +254,7 @@ impl Track {
             *known_m += gain * (fresh_m - *known_m);
         }
         self.note_motion(look);
+        self.parted = Parting::of(&self.motion.estimate(), look.points);
         self.belief.learn(&Belief::of(&self.qualities()), 0.3);
     }
 
@@ -363,53 +373,7 @@ impl Track {
         self.shape.yaw_rad = crate::ego::wrapped_rad(self.shape.yaw_rad + turn_rad);
         self.trails.reframe(moved);
         self.born_m = Vector2::from(moved(self.born_m.into()));
+        self.parted.reframe((sine, cosine), moved);
         self.floor_z_m += rise_m;
-    }
-
-    /// What is published, valid at `end`.
-    pub(super) fn object(&self, end: Time) -> Object {
-        let mut later = self.clone();
-        later.predict(end);
-        let estimate = later.motion.estimate();
-        let [length_m, width_m] = later.shape.size_m(later.belief.vehicle());
-        let (class, class_probability) = later.belief.class();
-        let (sine, cosine) = libm::sincos(later.shape.yaw_rad);
-        let ahead = Vector2::new(cosine, sine);
-        let stands = estimate.standing > 0.5 || !self.moves;
-        let moving_mps = if later.shape.front_known {
-            estimate.velocity_mps.dot(&ahead)
-        } else {
-            estimate.velocity_mps.norm()
-        };
-        // Of a normal distribution in the plane the share within a distance (Rayleigh).
-        let variance = 0.5 * estimate.position_covariance.trace();
-        let there = 1.0 - libm::exp(-0.5 * THERE_M * THERE_M / variance.max(1e-6));
-        let height_m = later.shape.top_m.max(0.1);
-        let speed_variance = (ahead.transpose() * estimate.velocity_covariance * ahead)[0];
-        Object {
-            id: self.id,
-            class,
-            class_probability,
-            measured: self.points > 0,
-            centre_m: [
-                estimate.position_m.x,
-                estimate.position_m.y,
-                self.floor_z_m + 0.5 * height_m,
-            ],
-            yaw_rad: later.shape.yaw_rad,
-            speed_mps: if stands { 0.0 } else { moving_mps },
-            yaw_rate_radps: if stands { 0.0 } else { estimate.yaw_rate_radps },
-            length_m,
-            width_m,
-            height_m,
-            position_deviation_m: [0, 1]
-                .map(|axis| libm::sqrt(estimate.position_covariance[(axis, axis)])),
-            yaw_deviation_rad: libm::sqrt(later.shape.yaw_variance),
-            speed_deviation_mps: libm::sqrt(speed_variance),
-            existence: self.existence.probability() * later.belief.road_user() * there,
-            first_seen: self.first_seen,
-            last_measured: self.last_measured,
-            points: self.points,
-        }
     }
 }

@@ -1,0 +1,183 @@
+//! A road user of which nothing was left, and which is seen again.
+
+use nalgebra::Vector2;
+
+use super::{MOVING_MPS, Track};
+use crate::time::Time;
+use crate::track::motion::Estimate;
+
+/// How long a lost road user may be out of sight and still be the same.
+const LONGEST_S: f64 = 4.0;
+/// How far from where both velocities lead it may be, and for each metre of its length and of
+/// the way more.
+const OFF_M: f64 = 0.8;
+const OFF_PER_LENGTH: f64 = 0.25;
+const OFF_PER_WAY: f64 = 0.15;
+/// How much it may have turned in a second, and the directions be wrong.
+const TURN_RADPS: f64 = 0.6;
+const TURN_RAD: f64 = 0.4;
+/// Share by which its speed may have changed.
+const SPEED_SHARE: f64 = 0.4;
+/// How much longer it may be than was seen before.
+const GROWTH_M: f64 = 1.0;
+/// Standard deviation from which on nothing is known of a velocity.
+const UNKNOWN_MPS: f64 = 1.5;
+
+/// Where and how fast a track was when it was last measured.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Parting {
+    position_m: Vector2<f64>,
+    velocity_mps: Vector2<f64>,
+    deviation_mps: f64,
+    standing: f64,
+    /// Returns on it.
+    points: f64,
+}
+
+impl Parting {
+    pub(super) fn of(estimate: &Estimate, points: usize) -> Self {
+        Self {
+            position_m: estimate.position_m,
+            velocity_mps: estimate.velocity_mps,
+            deviation_mps: libm::sqrt(0.5 * estimate.velocity_covariance.trace()),
+            standing: estimate.standing,
+            points: points as f64,
+        }
+    }
+
+    pub(super) fn reframe(
+        &mut self,
+        (sine, cosine): (f64, f64),
+        moved: impl Fn([f64; 2]) -> [f64; 2],
+    ) {
+        self.position_m = moved(self.position_m.into()).into();
+        let [x, y] = self.velocity_mps.into();
+        self.velocity_mps = Vector2::new(x * cosine - y * sine, x * sine + y * cosine);
+    }
+
+    fn moves(&self) -> bool {
+        self.standing < 0.5 && self.velocity_mps.norm() > MOVING_MPS
+    }
+
+    /// How far from here the road user would be that parted `gap_s` ago, at the mean of its last
+    /// velocity and of this one; `None` if that is too far, or if the velocities do not go
+    /// together.
+    fn off_from_m(&self, parted: &Self, gap_s: f64, length_m: f64) -> Option<f64> {
+        let is_known = self.deviation_mps < UNKNOWN_MPS;
+        let velocity_mps = if is_known {
+            self.velocity_mps
+        } else {
+            parted.velocity_mps
+        };
+        if parted.moves() && is_known {
+            let turn_rad = parted.velocity_mps.angle(&velocity_mps);
+            let speeds = [parted.velocity_mps, velocity_mps].map(|velocity| velocity.norm());
+            let changed_mps = libm::fabs(speeds[1] - speeds[0]);
+            let is_other = turn_rad > TURN_RAD + TURN_RADPS * gap_s
+                || changed_mps > SPEED_SHARE * speeds[0].max(speeds[1]) + MOVING_MPS;
+            if is_other {
+                return None;
+            }
+        } else if parted.moves() != self.moves() {
+            return None;
+        }
+        let way_m = 0.5 * gap_s * (parted.velocity_mps + velocity_mps);
+        let off_m = (self.position_m - parted.position_m - way_m).norm();
+        let farthest_m = OFF_M + OFF_PER_LENGTH * length_m + OFF_PER_WAY * way_m.norm();
+        (off_m < farthest_m).then_some(off_m)
+    }
+}
+
+impl Track {
+    /// Whether it may come back at a time, and is then worth an old id.
+    pub(in crate::track) fn may_return(&self, now: Time) -> bool {
+        self.is_published && (now - self.last_measured).seconds() <= LONGEST_S
+    }
+
+    /// How far this new track is from where one that is not seen any more would be by now;
+    /// `None` if it cannot be the same road user.
+    pub(in crate::track) fn off_from_m(&self, lost: &Self) -> Option<f64> {
+        let gap_s = (self.last_measured - lost.last_measured).seconds();
+        let length_m = lost.shape.size_m(lost.belief.vehicle())[0];
+        // A few returns may have been taken for the old one where this one was already seen.
+        let is_apart =
+            lost.last_measured < self.first_seen || lost.parted.points < 0.5 * self.parted.points;
+        if gap_s <= 0.0 || !is_apart || self.shape.seen_m[0] > length_m + GROWTH_M {
+            return None;
+        }
+        self.parted.off_from_m(&lost.parted, gap_s, length_m)
+    }
+
+    /// Whether nothing is seen of it, though others know it.
+    pub(in crate::track) fn is_missed(&self) -> bool {
+        self.is_published && self.points == 0
+    }
+
+    /// Leaves its id to another track.
+    pub(in crate::track) fn give_up(&mut self) -> Self {
+        let known = self.clone();
+        self.is_published = false;
+        self.existence.end();
+        known
+    }
+
+    /// Goes on as a road user that was lost.
+    pub(in crate::track) fn take_over(&mut self, lost: &Self) {
+        self.id = lost.id;
+        self.first_seen = lost.first_seen;
+        self.belief = lost.belief.clone();
+        self.is_published = true;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CYCLIST_M: f64 = 1.7;
+
+    /// Seen at an angle of a circle of 16 m on which it drives at 4 m/s.
+    fn at(angle_rad: f64) -> Parting {
+        let (sine, cosine) = angle_rad.sin_cos();
+        Parting {
+            position_m: Vector2::new(16.0 * cosine, 16.0 * sine),
+            velocity_mps: Vector2::new(-4.0 * sine, 4.0 * cosine),
+            deviation_mps: 0.3,
+            standing: 0.0,
+            points: 9.0,
+        }
+    }
+
+    #[test]
+    fn a_cyclist_who_turned_unseen_is_the_same() {
+        let off_m = at(0.6).off_from_m(&at(0.0), 2.4, CYCLIST_M);
+        assert!(off_m.is_some_and(|off_m| off_m < 0.5), "{off_m:?}");
+    }
+
+    #[test]
+    fn who_comes_back_elsewhere_or_otherwise_is_someone_else() {
+        let parted = at(0.0);
+        let mut elsewhere = at(0.6);
+        elsewhere.position_m.x += 4.0;
+        let mut back = at(0.6);
+        back.velocity_mps = -back.velocity_mps;
+        let mut faster = at(0.6);
+        faster.velocity_mps *= 2.5;
+        let mut waiting = at(0.0);
+        (waiting.velocity_mps, waiting.standing) = (Vector2::zeros(), 1.0);
+        for other in [elsewhere, back, faster, waiting] {
+            assert_eq!(other.off_from_m(&parted, 2.4, CYCLIST_M), None, "{other:?}");
+        }
+    }
+
+    #[test]
+    fn who_stood_is_found_where_it_stood() {
+        let mut stood = at(0.0);
+        (stood.velocity_mps, stood.standing) = (Vector2::zeros(), 1.0);
+        let mut seen = stood;
+        seen.position_m.x += 0.4;
+        assert!(seen.off_from_m(&stood, 3.0, 0.5).is_some());
+        seen.position_m.x += 1.5;
+        assert_eq!(seen.off_from_m(&stood, 3.0, 0.5), None);
+    }
+}
