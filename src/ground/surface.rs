@@ -285,10 +285,17 @@ impl Profile {
                 profile.push(ring.distance_m, ring.level_m);
             }
         }
-        // Beyond the last ring it goes on as it came there, for as far as that was.
+        // Beyond the last ring it goes on as it came there, for as far as that was, if it came
+        // so for two rings: a single rise is a kerb.
         let last = profile.count - 1;
         if last > 0 && run_m > SHORTEST_RUN_M {
             let slope = profile.slope[last - 1].clamp(-STEEPEST, STEEPEST);
+            let before = last.checked_sub(2).map_or(0.0, |ring| profile.slope[ring]);
+            let slope = if slope > 0.0 {
+                slope.min(before.max(0.0))
+            } else {
+                slope.max(before.min(0.0))
+            };
             profile.slope[last] = slope;
             let (distance_m, level_m) = (profile.distance_m[last], profile.level_m[last]);
             profile.push(distance_m + run_m, level_m + slope * run_m);
