@@ -2,8 +2,14 @@
 
 /// The lesser of two numbers, of which none is NaN: one instruction for many at once.
 #[inline(always)]
-pub(crate) fn least(a: f32, b: f32) -> f32 {
+pub(crate) fn least<T: PartialOrd>(a: T, b: T) -> T {
     if a < b { a } else { b }
+}
+
+/// The greater of two numbers, of which none is NaN.
+#[inline(always)]
+pub(crate) fn greatest<T: PartialOrd>(a: T, b: T) -> T {
+    if a > b { a } else { b }
 }
 
 /// The least of a power of two of numbers, of which none is NaN.

@@ -2,6 +2,10 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use multiversion::multiversion;
+
+use crate::float::{greatest, least};
+
 /// A rectangle in the plane, seen from a sensor at the origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rectangle {
@@ -30,16 +34,7 @@ impl Rectangle {
         if let Some(heading_rad) = heading_rad {
             return Self::along(points_m, heading_rad);
         }
-        let stride = points_m.len().div_ceil(MOST_POINTS).max(1);
-        let mut best = (f64::MIN, 0.0);
-        for step in 0..DIRECTIONS {
-            let yaw_rad = FRAC_PI_2 * step as f64 / DIRECTIONS as f64;
-            let closeness = closeness(points_m, stride, yaw_rad);
-            if closeness > best.0 {
-                best = (closeness, yaw_rad);
-            }
-        }
-        let rectangle = Self::along(points_m, best.1);
+        let rectangle = Self::along(points_m, Sample::of(points_m).closest_rad());
         if rectangle.length_m >= rectangle.width_m {
             rectangle
         } else {
@@ -121,21 +116,83 @@ impl Outline {
     }
 }
 
-/// How close points lie to the edges of their rectangle: the sum of 1/distance.
-fn closeness(points_m: &[[f64; 2]], stride: usize, yaw_rad: f64) -> f64 {
-    let (sine, cosine) = libm::sincos(yaw_rad);
-    let points = || points_m.iter().step_by(stride);
-    let extent = Extent::of(points().copied(), sine, cosine);
-    points()
-        .map(|point| {
-            let position = turned(point, sine, cosine);
-            let to_edge = |axis: usize| {
-                let (low, high) = (extent.low[axis], extent.high[axis]);
-                (position[axis] - low).min(high - position[axis])
-            };
-            1.0 / to_edge(0).min(to_edge(1)).max(NEAREST_M)
-        })
-        .sum()
+/// Some of many points, by coordinates.
+struct Sample {
+    count: usize,
+    x_m: [f64; MOST_POINTS],
+    y_m: [f64; MOST_POINTS],
+}
+
+/// Points that are compared together.
+const TOGETHER: usize = 4;
+
+impl Sample {
+    fn of(points_m: &[[f64; 2]]) -> Self {
+        let stride = points_m.len().div_ceil(MOST_POINTS).max(1);
+        // What is not filled stands where a point is, too, and widens no rectangle.
+        let [x, y] = points_m.first().copied().unwrap_or_default();
+        let mut sample = Self {
+            count: 0,
+            x_m: [x; MOST_POINTS],
+            y_m: [y; MOST_POINTS],
+        };
+        for [x, y] in points_m.iter().step_by(stride) {
+            (sample.x_m[sample.count], sample.y_m[sample.count]) = (*x, *y);
+            sample.count += 1;
+        }
+        sample
+    }
+
+    /// The direction in which the points lie closest to the edges of their rectangle.
+    fn closest_rad(&self) -> f64 {
+        let mut best = (f64::MIN, 0.0);
+        for step in 0..DIRECTIONS {
+            let yaw_rad = FRAC_PI_2 * step as f64 / DIRECTIONS as f64;
+            let (sine, cosine) = libm::sincos(yaw_rad);
+            let closeness = closeness(self, sine, cosine);
+            if closeness > best.0 {
+                best = (closeness, yaw_rad);
+            }
+        }
+        best.1
+    }
+}
+
+/// How close points lie to the edges of their rectangle: the sum of 1/distance. Written so that
+/// it vectorises.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn closeness(sample: &Sample, sine: f64, cosine: f64) -> f64 {
+    let (mut u_m, mut v_m) = ([0.0; MOST_POINTS], [0.0; MOST_POINTS]);
+    let count = sample.count.next_multiple_of(TOGETHER).min(MOST_POINTS);
+    let (x_m, y_m) = (&sample.x_m[..count], &sample.y_m[..count]);
+    let (u_m, v_m) = (&mut u_m[..count], &mut v_m[..count]);
+    for point in 0..count {
+        [u_m[point], v_m[point]] = turned(&[x_m[point], y_m[point]], sine, cosine);
+    }
+    let [u_low_m, u_high_m] = ends(u_m);
+    let [v_low_m, v_high_m] = ends(v_m);
+    for (u, v) in u_m.iter_mut().zip(v_m) {
+        let along_m = least(*u - u_low_m, u_high_m - *u);
+        let across_m = least(*v - v_low_m, v_high_m - *v);
+        *u = 1.0 / greatest(least(along_m, across_m), NEAREST_M);
+    }
+    u_m[..sample.count].iter().sum()
+}
+
+/// The least and the greatest of numbers, whose count is a multiple of [`TOGETHER`].
+#[inline(always)]
+fn ends(numbers: &[f64]) -> [f64; 2] {
+    let (mut low, mut high) = ([f64::MAX; TOGETHER], [f64::MIN; TOGETHER]);
+    for numbers in numbers.as_chunks::<TOGETHER>().0 {
+        for place in 0..TOGETHER {
+            low[place] = least(low[place], numbers[place]);
+            high[place] = greatest(high[place], numbers[place]);
+        }
+    }
+    [
+        low.into_iter().fold(f64::MAX, least),
+        high.into_iter().fold(f64::MIN, greatest),
+    ]
 }
 
 /// Least and greatest coordinates along and across a direction.
@@ -146,6 +203,7 @@ pub(super) struct Extent {
 }
 
 impl Extent {
+    #[inline]
     pub(super) fn of(points_m: impl Iterator<Item = [f64; 2]>, sine: f64, cosine: f64) -> Self {
         let nothing = Self {
             low: [f64::MAX; 2],
@@ -154,8 +212,8 @@ impl Extent {
         points_m.fold(nothing, |extent, point| {
             let [u, v] = turned(&point, sine, cosine);
             Self {
-                low: [extent.low[0].min(u), extent.low[1].min(v)],
-                high: [extent.high[0].max(u), extent.high[1].max(v)],
+                low: [least(extent.low[0], u), least(extent.low[1], v)],
+                high: [greatest(extent.high[0], u), greatest(extent.high[1], v)],
             }
         })
     }
@@ -166,6 +224,7 @@ impl Extent {
 }
 
 /// A point's coordinates along and across a direction.
+#[inline(always)]
 pub(super) fn turned([x, y]: &[f64; 2], sine: f64, cosine: f64) -> [f64; 2] {
     [x * cosine + y * sine, y * cosine - x * sine]
 }
