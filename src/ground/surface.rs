@@ -352,6 +352,25 @@ mod tests {
     use crate::cloud::sensor::VLP16;
     use crate::cloud::tests::scan_of;
 
+    #[test]
+    fn a_kerb_goes_on_level_and_a_slope_as_it_came() {
+        let behind = |levels_m: [f32; 3]| {
+            let mut rings = [Ring::default(); MAX_LAYERS];
+            let ways = [12.0, 16.5, 22.5].into_iter().zip(levels_m);
+            for (ring, (distance_m, level_m)) in rings.iter_mut().zip(ways) {
+                *ring = Ring {
+                    distance_m,
+                    level_m,
+                };
+            }
+            Profile::through(&rings).level_m(28.5)
+        };
+        assert_eq!(behind([0.0, 0.0, 0.12]), 0.12);
+        assert_eq!(behind([0.0, 0.0, -0.12]), -0.12);
+        assert!((behind([0.5, 0.95, 1.55]) - 2.15).abs() < 1e-3);
+        assert!((behind([-0.5, -0.95, -1.55]) + 2.15).abs() < 1e-3);
+    }
+
     /// A road that is level to 10 m and then rises, with a car's rear across it.
     fn rising_road(slope: f64) -> Scan {
         scan_of(1800, |column, layer| {

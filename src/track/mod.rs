@@ -3,7 +3,8 @@
 //! `objects` takes a revolution in: `spots` places its returns, `grouping` says which belong
 //! together, `assignment` what is whose, `sight` what is hidden and what is gone. A `road_user`
 //! learns from each `look` its `motion`, its `shape`, its `class`, and by its `trail` whether it
-//! moves; `existence` says whether it is there at all. `nearest` is the tracking of the thesis.
+//! moves; `existence` says whether it is there at all; and one that was lost gets its id back
+//! (`road_user`). `nearest` is the tracking of the thesis.
 
 mod assignment;
 

@@ -125,7 +125,7 @@ impl Track {
     pub(in crate::track) fn take_over(&mut self, lost: &Self) {
         self.id = lost.id;
         self.first_seen = lost.first_seen;
-        self.belief = lost.belief.clone();
+        self.belief = lost.belief;
         self.is_published = true;
     }
 }
