@@ -310,6 +310,7 @@ mod tests {
             speed_deviation_mps: 0.1,
             existence: 0.5,
             first_seen: Time::from_micros(1),
+            seen_since: Time::from_micros(1),
             points: 70_000,
         }
     }

@@ -25,6 +25,9 @@ struct Border {
     per_metre: [f64; 2],
 }
 
+/// A step between columns that is wider is no beam's.
+const WIDEST_RAD: f64 = 0.1;
+
 impl Border {
     fn at(&self, metres: f32) -> [f64; 2] {
         let metres = f64::from(metres);
@@ -43,6 +46,9 @@ impl Casting {
         cell_m: f64,
         window: &mut Window,
     ) {
+        if libm::fabs(scan.step_rad()) > WIDEST_RAD {
+            return;
+        }
         self.lay_out(scan, placements, cell_m, window.corner());
         // The area of a half turn does not overlap itself, however the sensor moves meanwhile.
         let half = stretches.partition_point(|stretch| stretch.column < scan.columns() / 2);

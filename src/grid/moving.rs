@@ -55,7 +55,7 @@ pub(super) fn mark_returns(
 /// Where something moves nothing stands: takes back what was seen in its box, and, as long as it
 /// is new, in those before.
 pub(super) fn clear_way(object: &Object, now: Time, map: &mut Map, cell_m: f64, revolution: u32) {
-    let age_s = (now - object.first_seen).seconds();
+    let age_s = (now - object.seen_since).seconds();
     let is_new = age_s < UNKNOWN_S;
     let back_m = if is_new {
         object.speed_mps * age_s

@@ -53,11 +53,6 @@ impl Existence {
         };
     }
 
-    /// It was taken for another one.
-    pub(super) fn end(&mut self) {
-        self.odds = f64::NEG_INFINITY;
-    }
-
     pub(super) fn is_confirmed(&self) -> bool {
         self.sightings >= CONFIRMING
     }

@@ -118,6 +118,8 @@ pub struct Object {
     pub existence: f64,
     /// When it was first seen.
     pub first_seen: Time,
+    /// Since when it was not lost.
+    pub seen_since: Time,
     /// When it was last seen.
     pub last_measured: Time,
     /// Returns on it in this revolution.

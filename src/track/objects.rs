@@ -228,10 +228,12 @@ impl ObjectTracker {
         let is_due = |track: &Track| {
             !track.is_published && track.object(end).existence >= parameters.least_confidence
         };
-        for number in 0..self.tracks.len() {
+        let mut number = 0;
+        while number < self.tracks.len() {
             if is_due(&self.tracks[number]) {
-                self.reunite(number);
+                number = self.reunite(number);
             }
+            number += 1;
         }
         for track in &mut self.tracks {
             let object = track.object(end);
@@ -244,20 +246,28 @@ impl ObjectTracker {
     }
 
     /// Gives a track that is to be published for the first time the id of one that was lost, or
-    /// of which nothing is seen now.
-    fn reunite(&mut self, number: usize) {
+    /// of which nothing is seen now, and which it replaces. Gives the track's number after that.
+    fn reunite(&mut self, number: usize) -> usize {
         let new = &self.tracks[number];
         let known = self.lost.iter().chain(&self.tracks).enumerate();
         let missed = known.filter(|(place, known)| *place < self.lost.len() || known.is_missed());
         let off = missed.filter_map(|(place, known)| Some((new.off_from_m(known)?, place)));
         let Some((_, place)) = off.min_by(|a, b| a.0.total_cmp(&b.0)) else {
-            return;
+            return number;
         };
-        let lost = match place.checked_sub(self.lost.len()) {
-            None => self.lost.swap_remove(place),
-            Some(unseen) => self.tracks[unseen].give_up(),
-        };
-        self.tracks[number].take_over(&lost);
+        match place.checked_sub(self.lost.len()) {
+            None => {
+                let lost = self.lost.swap_remove(place);
+                self.tracks[number].take_over(&lost);
+                number
+            }
+            Some(missed) => {
+                let missed_one = self.tracks.remove(missed);
+                let number = number - usize::from(missed < number);
+                self.tracks[number].take_over(&missed_one);
+                number
+            }
+        }
     }
 }
 

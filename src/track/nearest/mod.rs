@@ -159,6 +159,7 @@ fn object_of(
         // Half of all single clusters are noise, and each further sighting halves the doubt.
         existence: 1.0 - libm::exp2(-f64::from(followed.sightings.min(50))),
         first_seen: followed.first_seen,
+        seen_since: followed.first_seen,
         last_measured: now,
         points: outline.len(),
     }

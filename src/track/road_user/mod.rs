@@ -36,6 +36,8 @@ pub(super) struct Track {
     /// The time for which everything holds.
     time: Time,
     first_seen: Time,
+    /// Since when it was not lost.
+    seen_since: Time,
     pub(super) last_measured: Time,
     motion: Motion,
     shape: Shape,
@@ -78,6 +80,7 @@ impl Track {
             id,
             time,
             first_seen: time,
+            seen_since: time,
             last_measured: time,
             motion: Motion::new(look.middle_m, Matrix2::identity(), BIRTH_MPS),
             shape,

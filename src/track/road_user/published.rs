@@ -52,6 +52,7 @@ impl Track {
             speed_deviation_mps: libm::sqrt(speed_variance),
             existence: self.existence.probability() * later.belief.road_user() * there,
             first_seen: self.first_seen,
+            seen_since: self.seen_since,
             last_measured: self.last_measured,
             points: self.points,
         }

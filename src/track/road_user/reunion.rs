@@ -102,7 +102,13 @@ impl Track {
         // A few returns may have been taken for the old one where this one was already seen.
         let is_apart =
             lost.last_measured < self.first_seen || lost.parted.points < 0.5 * self.parted.points;
-        if gap_s <= 0.0 || !is_apart || self.shape.seen_m[0] > length_m + GROWTH_M {
+        let is_in_time = gap_s > 0.0 && gap_s <= LONGEST_S;
+        if !is_in_time || !is_apart || self.shape.seen_m[0] > length_m + GROWTH_M {
+            return None;
+        }
+        // What moves tells by its speed whether it is the same.
+        let is_alike = (self.belief.vehicle() > 0.5) == (lost.belief.vehicle() > 0.5);
+        if !lost.parted.moves() && !is_alike {
             return None;
         }
         self.parted.off_from_m(&lost.parted, gap_s, length_m)
@@ -113,19 +119,13 @@ impl Track {
         self.is_published && self.points == 0
     }
 
-    /// Leaves its id to another track.
-    pub(in crate::track) fn give_up(&mut self) -> Self {
-        let known = self.clone();
-        self.is_published = false;
-        self.existence.end();
-        known
-    }
-
     /// Goes on as a road user that was lost.
     pub(in crate::track) fn take_over(&mut self, lost: &Self) {
         self.id = lost.id;
         self.first_seen = lost.first_seen;
-        self.belief = lost.belief;
+        if lost.belief.road_user() > self.belief.road_user() {
+            self.belief = lost.belief;
+        }
         self.is_published = true;
     }
 }
