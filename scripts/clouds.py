@@ -7,7 +7,8 @@ import subprocess
 
 import numpy as np
 
-KREISEL = pathlib.Path(__file__).resolve().parent.parent / "target/release/kreisel"
+from program import KREISEL
+
 POINT_CLOUD = 49
 ELEVATIONS = np.radians(np.arange(-15, 16, 2))
 

@@ -14,12 +14,24 @@ pub(crate) fn greatest<T: PartialOrd>(a: T, b: T) -> T {
 
 /// The least of a power of two of numbers, of which none is NaN.
 #[inline(always)]
-pub(crate) fn least_of<const N: usize>(mut values: [f32; N]) -> f32 {
+pub(crate) fn least_of<const N: usize>(values: [f32; N]) -> f32 {
+    folded(values, least)
+}
+
+/// The greatest of a power of two of numbers, of which none is NaN.
+#[inline(always)]
+pub(crate) fn greatest_of<const N: usize>(values: [f32; N]) -> f32 {
+    folded(values, greatest)
+}
+
+/// Compares the halves with each other until one number is left.
+#[inline(always)]
+fn folded<const N: usize>(mut values: [f32; N], better: impl Fn(f32, f32) -> f32) -> f32 {
     let mut width = N;
     while width > 1 {
         width /= 2;
         for at in 0..width {
-            values[at] = least(values[at], values[at + width]);
+            values[at] = better(values[at], values[at + width]);
         }
     }
     values[0]

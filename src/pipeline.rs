@@ -77,17 +77,6 @@ pub enum Step {
     Grid,
 }
 
-impl Step {
-    /// All of them, in order.
-    pub const ALL: [Self; 5] = [
-        Self::Cloud,
-        Self::Ground,
-        Self::Cluster,
-        Self::Track,
-        Self::Grid,
-    ];
-}
-
 /// What the steps say about a revolution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RevolutionReport {

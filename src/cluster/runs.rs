@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::cloud::MAX_LAYERS;
-use crate::float::least;
+use crate::float::{greatest, least};
 
 /// Core points of one layer, each a neighbour of the one before.
 #[derive(Debug, Clone)]
@@ -38,10 +38,10 @@ impl Run {
     pub(super) fn extend(&mut self, column: usize, range_m: f32, at_m: [f32; 3]) {
         self.columns.end = column + 1;
         self.low_m = least(self.low_m, range_m);
-        self.high_m = -least(-self.high_m, -range_m);
+        self.high_m = greatest(self.high_m, range_m);
         for (axis, metres) in at_m.into_iter().enumerate() {
             self.low[axis] = least(self.low[axis], metres);
-            self.high[axis] = -least(-self.high[axis], -metres);
+            self.high[axis] = greatest(self.high[axis], metres);
         }
     }
 

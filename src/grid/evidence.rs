@@ -4,7 +4,7 @@ use multiversion::multiversion;
 
 use super::{GridParameters, NoReturn};
 use crate::cloud::{MAX_LAYERS, Scan};
-use crate::float::{least, least_of};
+use crate::float::{greatest, greatest_of, least, least_of};
 use crate::ground::Plane;
 
 /// The rays of a revolution over the ground, by columns and layers. From the side a ray is
@@ -121,7 +121,7 @@ impl Evidence {
         let until_m = parameters.obstacle_high_m as f32 - self.sensor_m;
         let mut stretches = Stretches::new(column, parameters.nearest_m as f32, passed);
         if until_m >= 0.0 {
-            let farthest_m = -least_of(free_m.map(|free_m| -free_m));
+            let farthest_m = greatest_of(*free_m);
             stretches.add(0.0, least(farthest_m, before_m));
         } else {
             for layer in 0..MAX_LAYERS {
@@ -331,7 +331,7 @@ impl<'a> Stretches<'a> {
             (self.last.from_m, self.last.to_m) = (from_m, to_m);
         } else {
             self.last.from_m = least(self.last.from_m, from_m);
-            self.last.to_m = -least(-self.last.to_m, -to_m);
+            self.last.to_m = greatest(self.last.to_m, to_m);
         }
     }
 
