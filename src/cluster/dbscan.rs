@@ -1,11 +1,10 @@
 //! DBSCAN over the rows of the array.
 
-use super::partition::Partition;
-use super::row::{Centre, Row};
-use super::runs::{Run, Runs};
+use super::joining::{Joiner, Points};
+use super::row::{self, Centre, Row};
 use super::window::Windows;
 use super::{ClusterParameters, Clusters};
-use crate::cloud::{MAX_LAYERS, Scan};
+use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, Scan};
 
 /// The cluster step. Its buffers are made once.
 #[derive(Debug, Clone)]
@@ -13,16 +12,15 @@ pub struct Dbscan {
     parameters: ClusterParameters,
     windows: Windows,
     rows: Vec<Row>,
-    /// Points that are looked at, in array order.
-    candidates: Vec<u32>,
-    /// Whether a point is its only neighbour.
-    alone: Vec<bool>,
-    runs: Runs,
-    /// Number of the run of each core point.
-    run_of: Vec<u32>,
-    /// Runs that belong together, by their numbers.
-    partition: Partition,
-    /// Cluster of each set's first run, while clusters are numbered.
+    /// Which of many pairs are neighbours, while they are counted.
+    near: Box<[f32; MAX_COLUMNS]>,
+    /// Points that their nearest along the layer do not make core points; later those of them
+    /// that are none but have neighbours.
+    open: Vec<Centre>,
+    joiner: Joiner,
+    /// First core point of each set of runs, and the set.
+    firsts: Vec<(usize, u32)>,
+    /// Cluster of each set of runs.
     numbers: Vec<i32>,
     clusters: Clusters,
 }
@@ -34,11 +32,10 @@ impl Dbscan {
             parameters: parameters.clone(),
             windows: Windows::new(parameters),
             rows: (0..MAX_LAYERS).map(|_| Row::new()).collect(),
-            candidates: vec![],
-            alone: vec![],
-            runs: Runs::default(),
-            run_of: vec![],
-            partition: Partition::default(),
+            near: Box::new([0.0; MAX_COLUMNS]),
+            open: vec![],
+            joiner: Joiner::new(),
+            firsts: vec![],
             numbers: vec![],
             clusters: Clusters::default(),
         }
@@ -51,67 +48,61 @@ impl Dbscan {
 
     /// Finds the clusters of the returns that `ground` does not mark.
     pub fn process(&mut self, scan: &Scan, ground: &[bool]) -> &Clusters {
+        let columns = scan.columns();
         self.windows.prepare(scan);
-        self.gather(scan, ground);
-        self.find_core_points(scan);
-        self.join_core_points(scan);
+        Row::turn(&mut self.rows, scan, ground);
+        // The few are within any window of an exact search.
+        let few = self.windows.clipped(columns);
+        for row in &mut self.rows {
+            row::count_along(row, columns, few, &self.parameters, &mut self.near);
+        }
+        for layer in 1..MAX_LAYERS {
+            let (below, above) = self.rows.split_at_mut(layer);
+            let row = &mut below[layer - 1];
+            row::count_across(row, &mut above[0], columns, few, &mut self.near);
+        }
+        for row in &mut self.rows {
+            row::judge(row, columns, &self.parameters);
+        }
+        self.find_core_points(columns);
+        let points = Points {
+            parameters: &self.parameters,
+            windows: &self.windows,
+            columns,
+        };
+        self.joiner.join(&mut self.rows, points);
         self.number_clusters(scan);
         self.adopt_border_points(scan);
         self.collect_points();
         &self.clusters
     }
 
-    fn gather(&mut self, scan: &Scan, ground: &[bool]) {
-        self.candidates.clear();
-        for (point, is_ground) in ground.iter().enumerate().take(scan.len()) {
-            let (column, row) = (scan.column(point), &mut self.rows[scan.layer(point)]);
-            if !scan.has_return(point) || *is_ground {
-                row.remove(column);
-                continue;
-            }
-            let eps_m = self.parameters.eps_m(scan.range_m()[point]);
-            row.put(column, scan.point_m(point), eps_m);
-            self.candidates.push(point as u32);
+    /// Looks closer at the points of which the nearest along their layer did not say enough.
+    fn find_core_points(&mut self, columns: usize) {
+        self.open.clear();
+        for layer in 0..MAX_LAYERS {
+            let row = &self.rows[layer];
+            let open = row::marked(&row.is_open[..columns]);
+            let centres = open.map(|column| row.centre(layer, column, &self.parameters));
+            self.open.extend(centres);
         }
-        // The few are within any window of an exact search.
-        let few = self.windows.clipped(scan.columns());
-        for row in &mut self.rows {
-            row.count_close(scan.columns(), few);
-        }
-    }
-
-    fn centre(&self, scan: &Scan, point: usize) -> Centre {
-        let range_m = scan.range_m()[point];
-        Centre {
-            column: scan.column(point),
-            layer: scan.layer(point),
-            position_m: scan.point_m(point),
-            range_m,
-            eps_m: self.parameters.eps_m(range_m),
-        }
-    }
-
-    fn find_core_points(&mut self, scan: &Scan) {
-        self.alone.clear();
-        self.alone.resize(scan.len(), false);
-        for point in &self.candidates {
-            let point = *point as usize;
-            let (column, layer) = (scan.column(point), scan.layer(point));
-            let needed = self.parameters.min_points(scan.range_m()[point]);
-            let mut neighbours = self.rows[layer].close(column);
-            if neighbours < needed {
-                neighbours = self.neighbours_up_to(&self.centre(scan, point), needed);
-            }
-            self.rows[layer].core[column] = neighbours >= needed;
-            self.alone[point] = neighbours == 1;
-        }
+        let mut open = std::mem::take(&mut self.open);
+        open.retain(|centre| {
+            let needed = self.parameters.min_points(centre.range_m);
+            let neighbours = self.neighbours_up_to(centre, needed);
+            self.rows[centre.layer].core[centre.column] = neighbours >= needed;
+            (2..needed).contains(&neighbours)
+        });
+        self.open = open;
     }
 
     /// How many neighbours a point has, itself included; counting stops at `needed`.
     fn neighbours_up_to(&self, centre: &Centre, needed: u32) -> u32 {
         let mut found = 0;
         for (layer, reach) in self.layers(centre) {
-            found += self.count(centre, layer, reach);
+            let stretches = self.windows.stretches(centre.column, reach, reach);
+            let counts = stretches.map(|stretch| row::count(&self.rows[layer], stretch, centre));
+            found += counts.into_iter().sum::<u32>();
             if found >= needed {
                 break;
             }
@@ -119,207 +110,84 @@ impl Dbscan {
         found
     }
 
-    fn count(&self, centre: &Centre, layer: usize, reach: usize) -> u32 {
-        let stretches = self.windows.stretches(centre.column, reach, reach);
-        let counts = stretches.map(|stretch| self.rows[layer].count(stretch, centre));
-        counts.into_iter().sum()
-    }
-
-    fn reach(&self, centre: &Centre, layer: usize) -> Option<usize> {
-        self.windows
-            .reach(centre.layer, layer, centre.range_m, centre.eps_m)
-    }
-
     /// The layers that can hold neighbours of a point, with their reach: its own first, then
     /// those below and those above until one is too far. The farther a layer, the less it
     /// reaches.
     fn layers(&self, centre: &Centre) -> impl Iterator<Item = (usize, usize)> {
-        let within = |layer: usize| self.reach(centre, layer).map(|reach| (layer, reach));
+        let within = |layer: usize| {
+            let reach = self
+                .windows
+                .reach(centre.layer, layer, centre.range_m, centre.eps_m);
+            reach.map(|reach| (layer, reach))
+        };
         let below = (0..centre.layer).rev().map_while(within);
         let above = (centre.layer + 1..MAX_LAYERS).map_while(within);
         within(centre.layer).into_iter().chain(below).chain(above)
     }
 
-    /// Joins core points that are neighbours: first along the layers, then along the columns,
-    /// then run by run with the runs of the same layer and of those above, because neighbours
-    /// see each other.
-    fn join_core_points(&mut self, scan: &Scan) {
-        self.find_runs(scan);
-        let mut partition = std::mem::take(&mut self.partition);
-        partition.reset(self.runs.count());
-        self.join_along_columns(scan, &mut partition);
-        for layer in 0..MAX_LAYERS {
-            for run in self.runs.of(layer) {
-                self.join_run(scan, &mut partition, layer, run);
-            }
-        }
-        self.partition = partition;
-    }
-
-    /// Core points of a layer that follow each other within reach are one run.
-    fn find_runs(&mut self, scan: &Scan) {
-        self.run_of.resize(scan.len(), 0);
-        self.runs.clear();
-        for layer in 0..MAX_LAYERS {
-            let mut current: Option<Run> = None;
-            for column in 0..scan.columns() {
-                if !self.rows[layer].core[column] {
-                    continue;
-                }
-                let point = scan.index(column, layer);
-                let (range_m, at_m) = (scan.range_m()[point], scan.point_m(point));
-                let goes_on = current
-                    .as_mut()
-                    .filter(|run| self.follows(scan, layer, run.columns.end - 1, column));
-                if let Some(run) = goes_on {
-                    run.extend(column, range_m, at_m);
-                } else {
-                    if let Some(run) = current.take() {
-                        self.runs.push(layer, run);
-                    }
-                    current = Some(Run::of(self.runs.count(), column, range_m, at_m));
-                }
-                self.run_of[point] = self.runs.count() as u32;
-            }
-            if let Some(run) = current {
-                self.runs.push(layer, run);
-            }
-        }
-    }
-
-    /// Whether a core point is a neighbour of the one before it in its layer.
-    fn follows(&self, scan: &Scan, layer: usize, last: usize, column: usize) -> bool {
-        if last + 1 == column {
-            return self.rows[layer].follows(column);
-        }
-        let last = self.centre(scan, scan.index(last, layer));
-        self.sees(&last, layer, column)
-    }
-
-    /// Joins the runs that have neighbours in one column of two layers that follow each other.
-    fn join_along_columns(&self, scan: &Scan, partition: &mut Partition) {
-        for (layer, rows) in self.rows.windows(2).enumerate() {
-            let mut last = None;
-            for column in 0..scan.columns() {
-                if !rows[0].meets(&rows[1], column) {
-                    continue;
-                }
-                let runs = [layer, layer + 1].map(|layer| self.run_of[scan.index(column, layer)]);
-                if last.replace(runs) != Some(runs) {
-                    partition.join(runs[0], runs[1]);
-                }
-            }
-        }
-    }
-
-    /// Joins a run with all others that any of its points has a neighbour in. Its nearest
-    /// point reaches farthest.
-    fn join_run(&self, scan: &Scan, partition: &mut Partition, layer: usize, run: &Run) {
-        let (near_m, far_m) = (run.low_m, run.high_m);
-        let (eps_near_m, eps_far_m) = (self.parameters.eps_m(near_m), self.parameters.eps_m(far_m));
-        for other in layer..MAX_LAYERS {
-            let Some(reach) = self.windows.reach(layer, other, near_m, eps_near_m) else {
-                break;
-            };
-            for stretch in self.windows.around(&run.columns, reach) {
-                for candidate in self.runs.within(other, &stretch) {
-                    if run.gap_squared(candidate) <= eps_far_m * eps_far_m
-                        && partition.find(run.number) != partition.find(candidate.number)
-                        && self.touch(scan, (layer, run), (other, candidate), reach)
-                    {
-                        partition.join(run.number, candidate.number);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Whether any core point of one run is a neighbour of any of the other, `reach` columns
-    /// off at most.
-    fn touch(
-        &self,
-        scan: &Scan,
-        (layer, run): (usize, &Run),
-        (other_layer, other): (usize, &Run),
-        reach: usize,
-    ) -> bool {
-        let core = |layer: usize| move |column: &usize| self.rows[layer].core[*column];
-        let near = self.windows.around(&other.columns, reach).map(|stretch| {
-            let start = stretch.start.max(run.columns.start);
-            start..stretch.end.min(run.columns.end)
-        });
-        near.into_iter()
-            .flatten()
-            .filter(core(layer))
-            .any(|column| {
-                let centre = self.centre(scan, scan.index(column, layer));
-                let row = &self.rows[other_layer];
-                let stretches = self.windows.stretches(column, reach, reach);
-                stretches.into_iter().any(|stretch| {
-                    let start = stretch.start.max(other.columns.start);
-                    let both = start..stretch.end.min(other.columns.end).max(start);
-                    row.count(both.clone(), &centre) > 0
-                        && both
-                            .filter(core(other_layer))
-                            .any(|column| row.is_neighbour(column, &centre))
-                })
-            })
-    }
-
-    /// Whether the point in a column is a neighbour of a point and in its window.
-    fn sees(&self, centre: &Centre, layer: usize, column: usize) -> bool {
-        let apart = centre.column.abs_diff(column);
-        self.windows.clipped(apart) == apart && self.rows[layer].is_neighbour(column, centre)
-    }
-
     /// Numbers clusters by their first core point.
     fn number_clusters(&mut self, scan: &Scan) {
+        let Joiner {
+            runs, partition, ..
+        } = &mut self.joiner;
+        let layered =
+            || (0..MAX_LAYERS).flat_map(|layer| runs.of(layer).iter().map(move |run| (layer, run)));
+        self.firsts.clear();
+        self.firsts
+            .extend((0..runs.count() as u32).map(|set| (usize::MAX, set)));
+        for (layer, run) in layered() {
+            let first = &mut self.firsts[partition.find(run.number) as usize].0;
+            *first = scan.index(run.columns.start, layer).min(*first);
+        }
+        self.firsts.retain(|(first, _)| *first != usize::MAX);
+        self.firsts.sort_unstable();
         self.numbers.clear();
-        self.numbers.resize(self.runs.count(), Clusters::NONE);
-        let labels = &mut self.clusters.labels;
+        self.numbers.resize(runs.count(), Clusters::NONE);
+        for (number, (_, set)) in self.firsts.iter().enumerate() {
+            self.numbers[*set as usize] = number as i32;
+        }
+        let Clusters { labels, ends, .. } = &mut self.clusters;
         labels.clear();
         labels.resize(scan.len(), Clusters::NONE);
-        let mut clusters = 0;
-        for point in self
-            .candidates
-            .iter()
-            .filter(|point| is_core(&self.rows, scan, **point as usize))
-        {
-            let run = self.run_of[*point as usize];
-            let number = &mut self.numbers[self.partition.find(run) as usize];
-            if *number == Clusters::NONE {
-                *number = clusters;
-                clusters += 1;
+        ends.clear();
+        ends.resize(self.firsts.len(), 0);
+        for (layer, run) in layered() {
+            let number = self.numbers[partition.find(run.number) as usize];
+            ends[number as usize] += run.points as usize;
+            let run_of = &self.rows[layer].run_of;
+            for column in run
+                .columns
+                .clone()
+                .filter(|column| run_of[*column] == run.number)
+            {
+                labels[scan.index(column, layer)] = number;
             }
-            labels[*point as usize] = *number;
         }
-        self.clusters.ends.clear();
-        self.clusters.ends.resize(clusters as usize, 0);
     }
 
     /// A point that is no core point belongs to the cluster of the nearest core point that is
     /// its neighbour (of equally near ones, the first in the array), else to none.
     fn adopt_border_points(&mut self, scan: &Scan) {
-        for point in &self.candidates {
-            let point = *point as usize;
-            if is_core(&self.rows, scan, point) || self.alone[point] {
-                continue;
-            }
-            if let Some(core) = self.nearest_core_point(scan, point) {
-                self.clusters.labels[point] = self.clusters.labels[core];
+        for centre in &self.open {
+            if let Some(core) = self.nearest_core_point(scan, centre) {
+                let number = self.clusters.labels[core];
+                self.clusters.labels[scan.index(centre.column, centre.layer)] = number;
+                self.clusters.ends[number as usize] += 1;
             }
         }
     }
 
-    fn nearest_core_point(&self, scan: &Scan, point: usize) -> Option<usize> {
-        let centre = self.centre(scan, point);
+    fn nearest_core_point(&self, scan: &Scan, centre: &Centre) -> Option<usize> {
         let mut nearest: Option<(f32, usize)> = None;
-        for (layer, reach) in self.layers(&centre) {
+        for (layer, reach) in self.layers(centre) {
+            let row = &self.rows[layer];
             for stretch in self.windows.stretches(centre.column, reach, reach) {
-                for column in stretch {
+                if row::count(row, stretch.clone(), centre) == 0 {
+                    continue;
+                }
+                for column in stretch.filter(|column| row.core[*column]) {
                     let other = scan.index(column, layer);
-                    let distance = self.rows[layer].squared_distance(column, &centre);
-                    if let Some(distance) = distance.filter(|_| self.rows[layer].core[column])
+                    if let Some(distance) = row.squared_distance(column, centre)
                         && nearest.is_none_or(|best| (distance, other) < best)
                     {
                         nearest = Some((distance, other));
@@ -337,13 +205,6 @@ impl Dbscan {
             points,
             ends,
         } = &mut self.clusters;
-        let labelled = || {
-            let points = self.candidates.iter();
-            points.filter(|point| labels[**point as usize] != Clusters::NONE)
-        };
-        for point in labelled() {
-            ends[labels[*point as usize] as usize] += 1;
-        }
         let mut total = 0;
         for end in ends.iter_mut() {
             // For now where the cluster begins; the loop below moves it to where it ends.
@@ -351,16 +212,14 @@ impl Dbscan {
         }
         points.clear();
         points.resize(total, 0);
-        for point in labelled() {
-            let end = &mut ends[labels[*point as usize] as usize];
-            points[*end] = *point;
-            *end += 1;
+        for (point, label) in labels.iter().enumerate() {
+            if *label != Clusters::NONE {
+                let end = &mut ends[*label as usize];
+                points[*end] = point as u32;
+                *end += 1;
+            }
         }
     }
-}
-
-fn is_core(rows: &[Row], scan: &Scan, point: usize) -> bool {
-    rows[scan.layer(point)].core[scan.column(point)]
 }
 
 #[cfg(test)]

@@ -3,9 +3,11 @@
 //! DBSCAN (Ester et al. 1996) without a tree: the array is sorted by azimuth and elevation
 //! already, so that the neighbours of a point stand in a few short stretches of its rows.
 //! `window` says in which, `row` compares points along a layer, `dbscan` is the algorithm,
-//! `partition` joins core points, and `runs` spare most of the joining.
+//! `joining` says which core points belong together, by way of `runs`, in a `partition`.
 
 mod dbscan;
+
+mod joining;
 
 mod partition;
 
@@ -17,6 +19,7 @@ mod window;
 
 pub use dbscan::Dbscan;
 
+use crate::float::{greatest, least};
 use crate::parameter::{choices, parameters};
 
 choices! {
@@ -54,18 +57,27 @@ parameters! {
 
 impl ClusterParameters {
     /// Neighbour distance of a return at a range.
+    #[inline(always)]
     fn eps_m(&self, range_m: f32) -> f32 {
         self.eps_m as f32 + self.eps_per_m as f32 * range_m
     }
 
     /// Neighbours that make a return at a range a core point.
     fn min_points(&self, range_m: f32) -> u32 {
-        let scaled = self.min_points as f32 * self.min_points_range_m as f32 / range_m;
-        let bounded = scaled
-            .min(self.min_points as f32)
-            .max(self.min_points_far as f32);
         // Rounded half up, in integers only.
-        (bounded + 0.5) as u32
+        (self.more_than(range_m) + 1.0) as u32
+    }
+
+    /// So many neighbours are not enough, and one more is: [`ClusterParameters::min_points`]
+    /// before it is made whole.
+    #[inline(always)]
+    fn more_than(&self, range_m: f32) -> f32 {
+        let scaled = self.min_points as f32 * self.min_points_range_m as f32 / range_m;
+        let bounded = greatest(
+            least(scaled, self.min_points as f32),
+            self.min_points_far as f32,
+        );
+        bounded - 0.5
     }
 }
 

@@ -13,6 +13,20 @@ impl Partition {
         self.parent.extend(0..len as u32);
     }
 
+    /// Finds the sets of all numbers at once: [`Partition::parents`] are the smallest members, for
+    /// now.
+    pub(super) fn flatten(&mut self) {
+        for number in 0..self.parent.len() {
+            // Parents are smaller, and their own ones are found already.
+            self.parent[number] = self.parent[self.parent[number] as usize];
+        }
+    }
+
+    /// A member of each number's set: the smallest one that was known at some time.
+    pub(super) fn parents(&self) -> &[u32] {
+        &self.parent
+    }
+
     /// The smallest member of a number's set.
     pub(super) fn find(&mut self, mut number: u32) -> u32 {
         while self.parent[number as usize] != number {

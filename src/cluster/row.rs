@@ -1,8 +1,11 @@
-//! One layer as a structure of arrays along the columns.
+//! The array turned: layer by layer, so that what is near along a layer stands side by side.
 
 use std::ops::Range;
 
-use crate::cloud::MAX_COLUMNS;
+use multiversion::multiversion;
+
+use super::ClusterParameters;
+use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, Scan};
 use crate::float::least;
 
 /// The points of a layer that are looked at. The others stand at infinity, where nothing is
@@ -12,13 +15,20 @@ pub(super) struct Row {
     x_m: Box<[f32; MAX_COLUMNS]>,
     y_m: Box<[f32; MAX_COLUMNS]>,
     z_m: Box<[f32; MAX_COLUMNS]>,
+    range_m: Box<[f32; MAX_COLUMNS]>,
     eps_squared: Box<[f32; MAX_COLUMNS]>,
-    /// How many of the next few to either side are neighbours of a point.
-    close: Box<[u32; MAX_COLUMNS]>,
+    /// Neighbours that were counted so far.
+    close: Box<[f32; MAX_COLUMNS]>,
     /// Whether it is a neighbour of the point in the column before.
-    follows: Box<[bool; MAX_COLUMNS]>,
+    pub(super) follows: Box<[bool; MAX_COLUMNS]>,
+    /// Whether it is a neighbour of the point above it.
+    meets: Box<[bool; MAX_COLUMNS]>,
     /// Whether it is a core point.
     pub(super) core: Box<[bool; MAX_COLUMNS]>,
+    /// Whether the next few do not suffice to call it one.
+    pub(super) is_open: Box<[bool; MAX_COLUMNS]>,
+    /// Number of the run of each core point, or [`Row::NO_RUN`].
+    pub(super) run_of: Box<[u32; MAX_COLUMNS]>,
 }
 
 /// A point with all that its neighbourhood depends on.
@@ -33,8 +43,15 @@ pub(super) struct Centre {
 
 /// Columns to either side in which a point on a surface has enough neighbours.
 const NEXT_FEW: usize = 4;
+/// Columns that are turned at once: so many, of all layers, are in the fastest cache.
+const TURNED: usize = 64;
+/// Columns to either side of a point's own in which its neighbours in the next layer are counted.
+const BESIDE: usize = 1;
 
 impl Row {
+    /// The number of no run.
+    pub(super) const NO_RUN: u32 = u32::MAX;
+
     pub(super) fn new() -> Self {
         let zeros = || Box::new([0.0; MAX_COLUMNS]);
         let never = || Box::new([false; MAX_COLUMNS]);
@@ -42,88 +59,74 @@ impl Row {
             x_m: zeros(),
             y_m: zeros(),
             z_m: zeros(),
+            range_m: zeros(),
             eps_squared: zeros(),
-            close: Box::new([0; MAX_COLUMNS]),
+            close: zeros(),
             follows: never(),
+            meets: never(),
             core: never(),
+            is_open: never(),
+            run_of: Box::new([0; MAX_COLUMNS]),
         }
     }
 
-    /// Takes out the point in a column.
-    pub(super) fn remove(&mut self, column: usize) {
-        self.x_m[column] = f32::INFINITY;
-        self.core[column] = false;
-    }
-
-    /// Puts a point into a column.
-    pub(super) fn put(&mut self, column: usize, [x, y, z]: [f32; 3], eps_m: f32) {
-        self.x_m[column] = x;
-        self.y_m[column] = y;
-        self.z_m[column] = z;
-        self.eps_squared[column] = eps_m * eps_m;
-        self.core[column] = false;
-    }
-
-    /// Counts the neighbours of all points among the next few columns, up to `few`, not over the
-    /// seam. Written so that it vectorises.
-    pub(super) fn count_close(&mut self, columns: usize, few: usize) {
-        let mut near = [0u32; MAX_COLUMNS];
-        self.close[..columns].fill(0);
-        for apart in 1..=few.min(NEXT_FEW).min(columns.saturating_sub(1)) {
-            let pairs = columns - apart;
-            let (x, x2) = (&self.x_m[..pairs], &self.x_m[apart..columns]);
-            let (y, y2) = (&self.y_m[..pairs], &self.y_m[apart..columns]);
-            let (z, z2) = (&self.z_m[..pairs], &self.z_m[apart..columns]);
-            let (eps, eps2) = (
-                &self.eps_squared[..pairs],
-                &self.eps_squared[apart..columns],
-            );
-            for (pair, near) in near[..pairs].iter_mut().enumerate() {
-                let (dx, dy, dz) = (x2[pair] - x[pair], y2[pair] - y[pair], z2[pair] - z[pair]);
-                let squared = dx * dx + dy * dy + dz * dz;
-                *near = u32::from(squared <= least(eps[pair], eps2[pair]));
-            }
-            for (close, near) in self.close[..pairs].iter_mut().zip(&near[..pairs]) {
-                *close += near;
-            }
-            for (close, near) in self.close[apart..columns].iter_mut().zip(&near[..pairs]) {
-                *close += near;
-            }
-            if apart == 1 {
-                for (follows, near) in self.follows[1..columns].iter_mut().zip(&near[..pairs]) {
-                    *follows = *near == 1;
-                }
+    /// Takes the returns over that are not ground, layer by layer.
+    pub(super) fn turn(rows: &mut [Self], scan: &Scan, ground: &[bool]) {
+        for begin in (0..scan.columns()).step_by(TURNED) {
+            let columns = begin..scan.columns().min(begin + TURNED);
+            for (layer, row) in rows.iter_mut().enumerate() {
+                row.take(layer, columns.clone(), scan, ground);
             }
         }
     }
 
-    /// Neighbours of the point in a column that were found by [`Row::count_close`], itself
-    /// included.
-    pub(super) fn close(&self, column: usize) -> u32 {
-        self.close[column] + 1
-    }
-
-    /// Whether the point in a column is a neighbour of the one in the column before.
-    pub(super) fn follows(&self, column: usize) -> bool {
-        column > 0 && self.follows[column]
-    }
-
-    /// How many points of a stretch are neighbours of a point. Written so that it vectorises.
-    pub(super) fn count(&self, stretch: Range<usize>, centre: &Centre) -> u32 {
-        let [x, y, z] = centre.position_m;
-        let eps_squared = centre.eps_m * centre.eps_m;
-        let points = self.x_m[stretch.clone()]
-            .iter()
-            .zip(&self.y_m[stretch.clone()])
-            .zip(&self.z_m[stretch.clone()])
-            .zip(&self.eps_squared[stretch]);
-        let mut found = 0;
-        for (((x_m, y_m), z_m), other_squared) in points {
-            let (dx, dy, dz) = (x_m - x, y_m - y, z_m - z);
-            let near = dx * dx + dy * dy + dz * dz <= least(eps_squared, *other_squared);
-            found += u32::from(near);
+    fn take(&mut self, layer: usize, columns: Range<usize>, scan: &Scan, ground: &[bool]) {
+        let [x_m, y_m, z_m, range_m] = [scan.x_m(), scan.y_m(), scan.z_m(), scan.range_m()]
+            .map(|of_points| &of_points.as_chunks::<MAX_LAYERS>().0[columns.clone()]);
+        let ground = &ground.as_chunks::<MAX_LAYERS>().0[columns.clone()];
+        let own = [
+            &mut self.x_m,
+            &mut self.y_m,
+            &mut self.z_m,
+            &mut self.range_m,
+        ];
+        let [own_x, own_y, own_z, own_range] = own.map(|own| &mut own[columns.clone()]);
+        for at in 0..columns.len() {
+            let is_taken = (range_m[at][layer] > 0.0) & !ground[at][layer];
+            own_x[at] = if is_taken {
+                x_m[at][layer]
+            } else {
+                f32::INFINITY
+            };
+            own_y[at] = y_m[at][layer];
+            own_z[at] = z_m[at][layer];
+            own_range[at] = range_m[at][layer];
         }
-        found
+    }
+
+    /// The point in a column, with the distance within which others are its neighbours.
+    pub(super) fn centre(
+        &self,
+        layer: usize,
+        column: usize,
+        parameters: &ClusterParameters,
+    ) -> Centre {
+        Centre {
+            column,
+            layer,
+            position_m: [self.x_m[column], self.y_m[column], self.z_m[column]],
+            range_m: self.range_m[column],
+            eps_m: parameters.eps_m(self.range_m[column]),
+        }
+    }
+
+    /// The coordinates and the ranges of the points in a stretch.
+    pub(super) fn points(&self, stretch: Range<usize>) -> ([&[f32]; 3], &[f32]) {
+        let at_m = [&self.x_m, &self.y_m, &self.z_m];
+        (
+            at_m.map(|metres| &metres[stretch.clone()]),
+            &self.range_m[stretch],
+        )
     }
 
     /// Whether the point in a column is a neighbour of a point.
@@ -143,15 +146,172 @@ impl Row {
         let eps_squared = least(centre.eps_m * centre.eps_m, self.eps_squared[column]);
         (squared <= eps_squared).then_some(squared)
     }
+}
 
-    /// Whether two core points in a column of two layers are neighbours.
-    pub(super) fn meets(&self, other: &Self, column: usize) -> bool {
-        let (dx, dy, dz) = (
-            self.x_m[column] - other.x_m[column],
-            self.y_m[column] - other.y_m[column],
-            self.z_m[column] - other.z_m[column],
-        );
-        let eps_squared = least(self.eps_squared[column], other.eps_squared[column]);
-        self.core[column] & other.core[column] && dx * dx + dy * dy + dz * dz <= eps_squared
+/// Counts, for all points of a layer, themselves and their neighbours among the next few columns,
+/// up to `few`, not over the seam.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub(super) fn count_along(
+    row: &mut Row,
+    columns: usize,
+    few: usize,
+    parameters: &ClusterParameters,
+    near: &mut [f32; MAX_COLUMNS],
+) {
+    let (x, y, z) = (
+        &row.x_m[..columns],
+        &row.y_m[..columns],
+        &row.z_m[..columns],
+    );
+    let range_m = &row.range_m[..columns];
+    let eps_squared = &mut row.eps_squared[..columns];
+    for column in 0..columns {
+        let eps_m = parameters.eps_m(range_m[column]);
+        eps_squared[column] = eps_m * eps_m;
     }
+    let eps_squared = &row.eps_squared[..columns];
+    let close = &mut row.close[..columns];
+    close.fill(1.0);
+    for apart in 1..=few.min(NEXT_FEW).min(columns.saturating_sub(1)) {
+        let pairs = columns - apart;
+        let near = &mut near[..pairs];
+        let (x2, y2, z2) = (&x[apart..], &y[apart..], &z[apart..]);
+        let eps2 = &eps_squared[apart..];
+        for pair in 0..pairs {
+            let (dx, dy, dz) = (x2[pair] - x[pair], y2[pair] - y[pair], z2[pair] - z[pair]);
+            let squared = dx * dx + dy * dy + dz * dz;
+            let is_near = squared <= least(eps_squared[pair], eps2[pair]);
+            near[pair] = if is_near { 1.0 } else { 0.0 };
+        }
+        for pair in 0..pairs {
+            close[pair] += near[pair];
+        }
+        let behind = &mut close[apart..];
+        for pair in 0..pairs {
+            behind[pair] += near[pair];
+        }
+        if apart == 1 {
+            let follows = &mut row.follows[1..columns];
+            for pair in 0..pairs {
+                follows[pair] = near[pair] > 0.0;
+            }
+        }
+    }
+}
+
+/// Counts, for all points of two layers, their neighbours in the other one in their own column
+/// and in those beside it, up to `few`, not over the seam.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub(super) fn count_across(
+    row: &mut Row,
+    above: &mut Row,
+    columns: usize,
+    few: usize,
+    near: &mut [f32; MAX_COLUMNS],
+) {
+    let beside = few.min(BESIDE).min(columns.saturating_sub(1));
+    for (own, other) in [(0, 0), (0, beside), (beside, 0)] {
+        // Columns that the layer begins with, and those that the one above it does.
+        let pairs = columns - own.max(other);
+        let near = &mut near[..pairs];
+        let (x, y, z) = (&row.x_m[own..], &row.y_m[own..], &row.z_m[own..]);
+        let (x2, y2, z2) = (
+            &above.x_m[other..],
+            &above.y_m[other..],
+            &above.z_m[other..],
+        );
+        let (x, y, z) = (&x[..pairs], &y[..pairs], &z[..pairs]);
+        let (x2, y2, z2) = (&x2[..pairs], &y2[..pairs], &z2[..pairs]);
+        let eps = &row.eps_squared[own..][..pairs];
+        let eps2 = &above.eps_squared[other..][..pairs];
+        for pair in 0..pairs {
+            let (dx, dy, dz) = (x2[pair] - x[pair], y2[pair] - y[pair], z2[pair] - z[pair]);
+            let is_near = dx * dx + dy * dy + dz * dz <= least(eps[pair], eps2[pair]);
+            near[pair] = if is_near { 1.0 } else { 0.0 };
+        }
+        let close = &mut row.close[own..][..pairs];
+        for pair in 0..pairs {
+            close[pair] += near[pair];
+        }
+        let close = &mut above.close[other..][..pairs];
+        for pair in 0..pairs {
+            close[pair] += near[pair];
+        }
+        if own == other {
+            let meets = &mut row.meets[..columns];
+            for column in 0..columns {
+                meets[column] = near[column] > 0.0;
+            }
+            if beside == 0 {
+                break;
+            }
+        }
+    }
+}
+
+/// Says which points of a layer are core points for the neighbours that were counted, and which
+/// are open.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub(super) fn judge(row: &mut Row, columns: usize, parameters: &ClusterParameters) {
+    let (x, range_m) = (&row.x_m[..columns], &row.range_m[..columns]);
+    let close = &row.close[..columns];
+    let (core, is_open) = (&mut row.core[..columns], &mut row.is_open[..columns]);
+    for column in 0..columns {
+        let is_taken = x[column] < f32::INFINITY;
+        let suffices = close[column] > parameters.more_than(range_m[column]);
+        core[column] = is_taken & suffices;
+        is_open[column] = is_taken & !suffices;
+    }
+}
+
+/// How many points of a stretch of a layer are neighbours of a point.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub(super) fn count(row: &Row, stretch: Range<usize>, centre: &Centre) -> u32 {
+    let [x, y, z] = centre.position_m;
+    let own = centre.eps_m * centre.eps_m;
+    let (x_m, y_m, z_m) = (
+        &row.x_m[stretch.start..stretch.end],
+        &row.y_m[stretch.start..stretch.end],
+        &row.z_m[stretch.start..stretch.end],
+    );
+    let eps_squared = &row.eps_squared[stretch.start..stretch.end];
+    let mut found = 0;
+    for at in 0..x_m.len() {
+        let (dx, dy, dz) = (x_m[at] - x, y_m[at] - y, z_m[at] - z);
+        let near = dx * dx + dy * dy + dz * dz <= least(own, eps_squared[at]);
+        found += u32::from(near);
+    }
+    found
+}
+
+/// Marks the columns in which core points of a layer and of the one above it are neighbours, where
+/// it is not the same two runs as in the column before.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub(super) fn mark_meetings(row: &Row, above: &Row, columns: usize, marks: &mut [bool]) {
+    let meets = &row.meets[..columns];
+    let (core, core2) = (&row.core[..columns], &above.core[..columns]);
+    let (run, run2) = (&row.run_of[..columns], &above.run_of[..columns]);
+    let marks = &mut marks[..columns];
+    for column in 0..columns {
+        marks[column] = meets[column] & core[column] & core2[column];
+    }
+    // Backwards, because each looks at the one before.
+    for column in (1..columns).rev() {
+        let is_same = (run[column] == run[column - 1]) & (run2[column] == run2[column - 1]);
+        marks[column] &= !(is_same & meets[column - 1]);
+    }
+}
+
+/// Columns that are marked, in order. Most are not, eight at once.
+pub(super) fn marked(marks: &[bool]) -> impl Iterator<Item = usize> {
+    const AT_ONCE: usize = 8;
+    let (eights, _) = marks.as_chunks::<AT_ONCE>();
+    let eights = eights.iter().enumerate();
+    let some = eights.filter(|(_, eight)| **eight != [false; AT_ONCE]);
+    let within = some.map(|(at, _)| AT_ONCE * at..AT_ONCE * (at + 1));
+    let rest = marks.len() / AT_ONCE * AT_ONCE..marks.len();
+    within
+        .chain([rest])
+        .flatten()
+        .filter(|column| marks[*column])
 }
