@@ -231,12 +231,40 @@ impl Motion {
         }
     }
 
-    pub(super) fn estimate(&self) -> Estimate {
-        let total: f64 = self.hypotheses.iter().map(|one| one.probability).sum();
+    fn total(&self) -> f64 {
+        self.hypotheses.iter().map(|one| one.probability).sum()
+    }
+
+    /// The state that all hypotheses agree on.
+    fn state(&self) -> State {
+        let total = self.total();
         let mut state = State::zeros();
         for hypothesis in &self.hypotheses {
             state += hypothesis.state * (hypothesis.probability / total);
         }
+        state
+    }
+
+    pub(super) fn position_m(&self) -> Vector2<f64> {
+        self.state().fixed_rows::<2>(0).into()
+    }
+
+    pub(super) fn velocity_mps(&self) -> Vector2<f64> {
+        self.state().fixed_rows::<2>(2).into()
+    }
+
+    pub(super) fn yaw_rate_radps(&self) -> f64 {
+        self.state()[4]
+    }
+
+    /// Probability that it stands.
+    pub(super) fn standing(&self) -> f64 {
+        self.hypotheses[0].probability / self.total()
+    }
+
+    pub(super) fn estimate(&self) -> Estimate {
+        let total = self.total();
+        let state = self.state();
         let mut covariance = Covariance::zeros();
         for hypothesis in &self.hypotheses {
             let apart = hypothesis.state - state;
@@ -249,7 +277,7 @@ impl Motion {
             yaw_rate_radps: state[4],
             position_covariance: covariance.fixed_view::<2, 2>(0, 0).into(),
             velocity_covariance: covariance.fixed_view::<2, 2>(2, 2).into(),
-            standing: self.hypotheses[0].probability / total,
+            standing: self.standing(),
         }
     }
 }

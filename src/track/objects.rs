@@ -53,9 +53,7 @@ impl ObjectTracker {
             .iter()
             .filter(|track| track.is_confirmed() && track.is_moving_vehicle());
         boxes.extend(driving.map(|track| {
-            let mut later = track.clone();
-            later.predict(end);
-            let place = later.rectangle();
+            let place = track.rectangle_at(end);
             Rectangle {
                 centre_m: placement.sensor_m(place.centre_m),
                 yaw_rad: wrapped_rad(place.yaw_rad - sensor.yaw_rad + FRAC_PI_2),
@@ -115,8 +113,8 @@ impl ObjectTracker {
                 FARTHEST_LEAP_M.min(parameters.association_distance_m + 2.0 * track.spread_m());
             for (column, group) in groups.iter().enumerate() {
                 let is_claimed = group.claimed_by == Some(row);
-                let apart_m = outline.distance_m(group.look.middle_m.into());
-                if apart_m > leap_m && !is_claimed {
+                let is_near = || outline.distance_within_m(group.look.middle_m.into(), leap_m);
+                if !is_claimed && is_near().is_none() {
                     continue;
                 }
                 let spots = self.grouping.spots(group);
@@ -170,7 +168,7 @@ impl ObjectTracker {
             }
             let is_piece = known
                 .iter()
-                .any(|place| place.distance_m(group.look.middle_m.into()) < 0.0);
+                .any(|place| place.contains(group.look.middle_m.into()));
             let spots = self.grouping.spots(group);
             // Of a vehicle that is far away a single layer may show the bumper.
             let may_be_bumper = spots.len() >= BUMPER_RETURNS
@@ -202,22 +200,29 @@ impl ObjectTracker {
             .tracks
             .extract_if(.., |track| track.is_gone(parameters));
         self.lost.extend(gone.filter(|track| track.may_return(end)));
-        let places: Vec<(Rectangle, f64)> = self
+        let places: Vec<(Rectangle, Outline, f64)> = self
             .tracks
             .iter()
-            .map(|track| (track.rectangle(), track.odds()))
+            .map(|track| {
+                let place = track.rectangle();
+                (place, place.outline(), track.odds())
+            })
             .collect();
         let mut number = 0;
         let doubled = self.tracks.extract_if(.., |track| {
             let own = number;
             number += 1;
             let centre_m = places[own].0.centre_m;
-            places.iter().enumerate().any(|(other, (place, odds))| {
-                let within_m = -0.3 * place.width_m.min(1.6);
-                let is_better =
-                    (*odds, std::cmp::Reverse(other)) > (track.odds(), std::cmp::Reverse(own));
-                other != own && is_better && place.outline().distance_m(centre_m) < within_m
-            })
+            let better = places.iter().enumerate().filter(|(other, (.., odds))| {
+                (*odds, std::cmp::Reverse(*other)) > (track.odds(), std::cmp::Reverse(own))
+            });
+            better
+                .filter(|(other, _)| *other != own)
+                .any(|(_, (place, outline, _))| {
+                    let depth_m = 0.3 * place.width_m.min(1.6);
+                    let distance_m = outline.distance_within_m(centre_m, 0.0);
+                    distance_m.is_some_and(|distance_m| distance_m < -depth_m)
+                })
         });
         self.lost
             .extend(doubled.filter(|track| track.may_return(end)));
@@ -232,16 +237,14 @@ impl ObjectTracker {
         while number < self.tracks.len() {
             if is_due(&self.tracks[number]) {
                 number = self.reunite(number);
+                self.tracks[number].is_published = true;
             }
             number += 1;
         }
-        for track in &mut self.tracks {
-            let object = track.object(end);
-            if object.existence >= parameters.least_confidence {
-                track.is_published = true;
-                self.objects.push(object);
-            }
-        }
+        let published = self.tracks.iter().filter(|track| track.is_published);
+        let objects = published.map(|track| track.object(end));
+        let listed = objects.filter(|object| object.existence >= parameters.least_confidence);
+        self.objects.extend(listed);
         self.objects.sort_by_key(|object| object.id);
     }
 

@@ -1,6 +1,7 @@
 //! Boxes around what a sensor sees of an object: one or two of its sides.
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::LazyLock;
 
 use multiversion::multiversion;
 
@@ -81,9 +82,11 @@ impl Rectangle {
     /// The same, ready to measure many distances.
     pub fn outline(&self) -> Outline {
         let (sine, cosine) = libm::sincos(self.yaw_rad);
+        let half_m = [0.5 * self.length_m, 0.5 * self.width_m];
         Outline {
             centre_m: self.centre_m,
-            half_m: [0.5 * self.length_m, 0.5 * self.width_m],
+            half_m,
+            radius_m: half_m[0].abs() + half_m[1].abs(),
             sine,
             cosine,
         }
@@ -95,11 +98,32 @@ impl Rectangle {
 pub struct Outline {
     centre_m: [f64; 2],
     half_m: [f64; 2],
+    /// No corner is farther from the middle.
+    radius_m: f64,
     sine: f64,
     cosine: f64,
 }
 
 impl Outline {
+    /// Whether a place is within, not on the edge.
+    pub fn contains(&self, at_m: [f64; 2]) -> bool {
+        let distance_m = self.distance_within_m(at_m, 0.0);
+        distance_m.is_some_and(|distance_m| distance_m < 0.0)
+    }
+
+    /// [`Outline::distance_m`] of a place that is nearer than this; most are far away, and only
+    /// looked at roughly.
+    #[inline]
+    pub fn distance_within_m(&self, at_m: [f64; 2], most_m: f64) -> Option<f64> {
+        let reach_m = self.radius_m + most_m;
+        let is_far = |axis: usize| (at_m[axis] - self.centre_m[axis]).abs() > reach_m;
+        if is_far(0) || is_far(1) {
+            return None;
+        }
+        let distance_m = self.distance_m(at_m);
+        (distance_m <= most_m).then_some(distance_m)
+    }
+
     /// Distance of a place from the edge, negative within.
     pub fn distance_m(&self, [x, y]: [f64; 2]) -> f64 {
         let offset = [x - self.centre_m[0], y - self.centre_m[1]];
@@ -146,17 +170,23 @@ impl Sample {
     /// The direction in which the points lie closest to the edges of their rectangle.
     fn closest_rad(&self) -> f64 {
         let mut best = (f64::MIN, 0.0);
-        for step in 0..DIRECTIONS {
-            let yaw_rad = FRAC_PI_2 * step as f64 / DIRECTIONS as f64;
-            let (sine, cosine) = libm::sincos(yaw_rad);
-            let closeness = closeness(self, sine, cosine);
+        for (step, (sine, cosine)) in TRIED.iter().enumerate() {
+            let closeness = closeness(self, *sine, *cosine);
             if closeness > best.0 {
-                best = (closeness, yaw_rad);
+                best = (closeness, tried_rad(step));
             }
         }
         best.1
     }
 }
+
+fn tried_rad(step: usize) -> f64 {
+    FRAC_PI_2 * step as f64 / DIRECTIONS as f64
+}
+
+/// Sine and cosine of every direction that is tried.
+static TRIED: LazyLock<[(f64, f64); DIRECTIONS]> =
+    LazyLock::new(|| std::array::from_fn(|step| libm::sincos(tried_rad(step))));
 
 /// How close points lie to the edges of their rectangle: the sum of 1/distance. Written so that
 /// it vectorises.

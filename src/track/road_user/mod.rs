@@ -115,22 +115,38 @@ impl Track {
     /// Carries the object on to a time.
     pub(super) fn predict(&mut self, to: Time) {
         let seconds = (to - self.time).seconds();
-        if seconds <= 0.0 {
-            return;
+        if seconds > 0.0 {
+            carry_on(&mut self.motion, &mut self.shape, seconds);
+            self.time = to;
         }
-        self.motion.predict(seconds);
-        let estimate = self.motion.estimate();
-        let turning = (1.0 - estimate.standing) * estimate.yaw_rate_radps;
-        self.shape.predict(turning, seconds);
-        self.time = to;
+    }
+
+    /// What moves of it, carried on to a time.
+    fn later(&self, to: Time) -> (Motion, Shape) {
+        let (mut motion, mut shape) = (self.motion.clone(), self.shape.clone());
+        let seconds = (to - self.time).seconds();
+        if seconds > 0.0 {
+            carry_on(&mut motion, &mut shape, seconds);
+        }
+        (motion, shape)
     }
 
     /// The box, if the object is where it is thought to be.
     pub(super) fn rectangle(&self) -> Rectangle {
-        let [length_m, width_m] = self.shape.size_m(self.belief.vehicle());
+        self.rectangle_of(&self.motion, &self.shape)
+    }
+
+    /// The box at a later time.
+    pub(super) fn rectangle_at(&self, to: Time) -> Rectangle {
+        let (motion, shape) = self.later(to);
+        self.rectangle_of(&motion, &shape)
+    }
+
+    fn rectangle_of(&self, motion: &Motion, shape: &Shape) -> Rectangle {
+        let [length_m, width_m] = shape.size_m(self.belief.vehicle());
         Rectangle {
-            centre_m: self.motion.estimate().position_m.into(),
-            yaw_rad: self.shape.yaw_rad,
+            centre_m: motion.position_m().into(),
+            yaw_rad: shape.yaw_rad,
             length_m,
             width_m,
         }
@@ -143,11 +159,11 @@ impl Track {
     }
 
     pub(super) fn velocity_mps(&self) -> Vector2<f64> {
-        self.motion.estimate().velocity_mps
+        self.motion.velocity_mps()
     }
 
     pub(super) fn position_m(&self) -> Vector2<f64> {
-        self.motion.estimate().position_m
+        self.motion.position_m()
     }
 
     pub(super) fn height_m(&self) -> f64 {
@@ -379,4 +395,11 @@ impl Track {
         self.parted.reframe((sine, cosine), moved);
         self.floor_z_m += rise_m;
     }
+}
+
+/// Carries motion and direction on by some seconds.
+fn carry_on(motion: &mut Motion, shape: &mut Shape, seconds: f64) {
+    motion.predict(seconds);
+    let turning = (1.0 - motion.standing()) * motion.yaw_rate_radps();
+    shape.predict(turning, seconds);
 }

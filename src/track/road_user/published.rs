@@ -12,15 +12,14 @@ const THERE_M: f64 = 2.0;
 impl Track {
     /// What is published, valid at `end`.
     pub(in crate::track) fn object(&self, end: Time) -> Object {
-        let mut later = self.clone();
-        later.predict(end);
-        let estimate = later.motion.estimate();
-        let [length_m, width_m] = later.shape.size_m(later.belief.vehicle());
-        let (class, class_probability) = later.belief.class();
-        let (sine, cosine) = libm::sincos(later.shape.yaw_rad);
+        let (motion, shape) = self.later(end);
+        let estimate = motion.estimate();
+        let [length_m, width_m] = shape.size_m(self.belief.vehicle());
+        let (class, class_probability) = self.belief.class();
+        let (sine, cosine) = libm::sincos(shape.yaw_rad);
         let ahead = Vector2::new(cosine, sine);
         let stands = estimate.standing > 0.5 || !self.moves;
-        let moving_mps = if later.shape.front_known {
+        let moving_mps = if shape.front_known {
             estimate.velocity_mps.dot(&ahead)
         } else {
             estimate.velocity_mps.norm()
@@ -28,7 +27,7 @@ impl Track {
         // Of a normal distribution in the plane the share within a distance (Rayleigh).
         let variance = 0.5 * estimate.position_covariance.trace();
         let there = 1.0 - libm::exp(-0.5 * THERE_M * THERE_M / variance.max(1e-6));
-        let height_m = later.shape.top_m.max(0.1);
+        let height_m = shape.top_m.max(0.1);
         let speed_variance = (ahead.transpose() * estimate.velocity_covariance * ahead)[0];
         Object {
             id: self.id,
@@ -40,7 +39,7 @@ impl Track {
                 estimate.position_m.y,
                 self.floor_z_m + 0.5 * height_m,
             ],
-            yaw_rad: later.shape.yaw_rad,
+            yaw_rad: shape.yaw_rad,
             speed_mps: if stands { 0.0 } else { moving_mps },
             yaw_rate_radps: if stands { 0.0 } else { estimate.yaw_rate_radps },
             length_m,
@@ -48,9 +47,9 @@ impl Track {
             height_m,
             position_deviation_m: [0, 1]
                 .map(|axis| libm::sqrt(estimate.position_covariance[(axis, axis)])),
-            yaw_deviation_rad: libm::sqrt(later.shape.yaw_variance),
+            yaw_deviation_rad: libm::sqrt(shape.yaw_variance),
             speed_deviation_mps: libm::sqrt(speed_variance),
-            existence: self.existence.probability() * later.belief.road_user() * there,
+            existence: self.existence.probability() * self.belief.road_user() * there,
             first_seen: self.first_seen,
             seen_since: self.seen_since,
             last_measured: self.last_measured,
