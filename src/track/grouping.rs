@@ -15,6 +15,9 @@ use crate::cluster::Clusters;
 pub(super) struct Grouping {
     placer: Placer,
     spots: Vec<Spot>,
+    /// Where the spots of each group begin, and the spots, while they are sorted.
+    begins: Vec<usize>,
+    sorted: Vec<Spot>,
     patches: Vec<Patch>,
     groups: Vec<Group>,
     /// Group numbers of what was cut off structure, ascending.
@@ -117,6 +120,7 @@ impl Grouping {
         let forecasts = Self::forecasts(tracks);
         let count = tracks.len();
         self.suspects.clear();
+        let mut near = vec![];
         for (number, patch) in self.patches.iter().enumerate() {
             if patch.is_suspect {
                 self.suspects.push((count + number) as u32);
@@ -124,9 +128,8 @@ impl Grouping {
             let own = (count + number) as u32;
             let spots = &mut self.spots[patch.begin..patch.end];
             let is_whole = patch.can_be_road_user(parameters);
-            let near: Vec<usize> = (0..count)
-                .filter(|track| is_near(&forecasts[*track], patch))
-                .collect();
+            near.clear();
+            near.extend((0..count).filter(|track| is_near(&forecasts[*track], patch)));
             let unclaimed = if is_whole { own } else { NOBODY };
             let mut claims = 0u32;
             let mut only = None;
@@ -135,20 +138,13 @@ impl Grouping {
                 spot.group = unclaimed;
                 let nearest = near
                     .iter()
-                    .map(|track| {
-                        (
-                            forecasts[*track].outline.distance_m(spot.at_m.into()),
-                            *track,
-                        )
-                    })
-                    .filter(|(distance_m, track)| {
+                    .filter_map(|track| {
+                        let forecast = &forecasts[*track];
                         // In structure only what is well within may be its own.
-                        let margin_m = if is_whole {
-                            forecasts[*track].margin_m
-                        } else {
-                            0.15
-                        };
-                        *distance_m <= margin_m
+                        let margin_m = if is_whole { forecast.margin_m } else { 0.15 };
+                        let at_m = spot.at_m.into();
+                        let distance_m = forecast.outline.distance_within_m(at_m, margin_m)?;
+                        Some((distance_m, *track))
                     })
                     .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
                 if let Some((_, track)) = nearest {
@@ -233,8 +229,7 @@ impl Grouping {
     /// Puts the spots of every group side by side and looks at it.
     fn gather(&mut self, tracks: &[Track], scene: &Scene<'_>) {
         let sensor_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
-        self.spots.retain(|spot| spot.group != NOBODY);
-        self.spots.sort_by_key(|spot| spot.group);
+        self.sort_spots(tracks.len() + self.patches.len());
         self.groups.clear();
         let mut begin = 0;
         for spots in self.spots.chunk_by(|a, b| a.group == b.group) {
@@ -251,6 +246,30 @@ impl Grouping {
             }
             begin = end;
         }
+    }
+
+    /// Sorts spots by their groups, which are numbered below a bound, and drops those of nobody.
+    fn sort_spots(&mut self, bound: usize) {
+        self.begins.clear();
+        self.begins.resize(bound + 1, 0);
+        let owned = || self.spots.iter().filter(|spot| spot.group != NOBODY);
+        for spot in owned() {
+            self.begins[spot.group as usize + 1] += 1;
+        }
+        for group in 1..=bound {
+            self.begins[group] += self.begins[group - 1];
+        }
+        let total = self.begins[bound];
+        self.sorted.clear();
+        if let Some(any) = self.spots.first() {
+            self.sorted.resize(total, *any);
+        }
+        for spot in owned() {
+            let at = &mut self.begins[spot.group as usize];
+            self.sorted[*at] = *spot;
+            *at += 1;
+        }
+        std::mem::swap(&mut self.spots, &mut self.sorted);
     }
 
     /// Joins free groups that stand close together and can be one vehicle.

@@ -291,9 +291,19 @@ fn goes_on(spots: &[Spot], scan: &Scan) -> f64 {
 fn ends(spots: &[Spot], sensor_m: Vector2<f64>, middle_m: Vector2<f64>) -> [Option<&Spot>; 2] {
     let sight = middle_m - sensor_m;
     let left = Vector2::new(-sight.y, sight.x);
-    let aside = |spot: &&Spot| left.dot(&(spot.at_m - sensor_m)) / (spot.at_m - sensor_m).norm();
-    let by_side = |a: &&Spot, b: &&Spot| aside(a).total_cmp(&aside(b));
-    [spots.iter().max_by(by_side), spots.iter().min_by(by_side)]
+    let aside = |spot: &Spot| left.dot(&(spot.at_m - sensor_m)) / (spot.at_m - sensor_m).norm();
+    let mut ends = [None; 2];
+    let (mut leftmost, mut rightmost) = (f64::NEG_INFINITY, f64::INFINITY);
+    for spot in spots {
+        let aside = aside(spot);
+        if aside >= leftmost {
+            (leftmost, ends[0]) = (aside, Some(spot));
+        }
+        if aside < rightmost {
+            (rightmost, ends[1]) = (aside, Some(spot));
+        }
+    }
+    ends
 }
 
 /// Whether something nearer stands directly to the left and to the right of a group.

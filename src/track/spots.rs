@@ -6,6 +6,7 @@ use super::{Scene, TrackParameters};
 use crate::cloud::Scan;
 use crate::cluster::Clusters;
 use crate::ego::Placement;
+use crate::float::{greatest, least};
 
 /// One return.
 #[derive(Debug, Clone, Copy)]
@@ -64,6 +65,8 @@ impl Patch {
 pub(super) struct Placer {
     placements: Vec<Placement>,
     floor: Floor,
+    /// Where on it each spot lies.
+    places: Vec<usize>,
     /// Whether there is more above each cell.
     covered: Vec<bool>,
     /// Of the cells of each part, by the part's number: how many, how many covered.
@@ -209,18 +212,18 @@ impl Placer {
         sweep.placements(scan.columns(), &mut self.placements);
         for points in clusters.iter() {
             let begin = spots.len();
-            for point in points {
+            spots.extend(points.iter().map(|point| {
                 let number = *point as usize;
                 let column = scan.column(number);
                 let [x, y, _] = scan.point_m(number).map(f64::from);
-                spots.push(Spot {
+                Spot {
                     at_m: Vector2::from(self.placements[column].local_m([x, y])),
                     above_m: f64::from(scene.heights_m[number]),
                     age_s: scan.age_s(column),
                     point: *point,
                     group: 0,
-                });
-            }
+                }
+            }));
             let whole = patch_of(spots, begin, scan);
             if (whole.high_m - whole.low_m).norm() < SMALLEST_DIVIDED_M {
                 patches.push(whole);
@@ -252,8 +255,13 @@ impl Placer {
         let nearest_m = own.iter().map(range_m).fold(f32::MAX, f32::min);
         let cell_m = CELL_M + CELL_PER_M * (f64::from(nearest_m) - NEAR_M).max(0.0);
         self.floor.begin(whole.low_m, whole.high_m, cell_m);
-        for spot in own.iter().filter(|spot| spot.is_at_body_height()) {
-            self.floor.add(self.floor.place(spot.at_m));
+        self.places.clear();
+        self.places
+            .extend(own.iter().map(|spot| self.floor.place(spot.at_m)));
+        for (spot, place) in own.iter().zip(&self.places) {
+            if spot.is_at_body_height() {
+                self.floor.add(*place);
+            }
         }
         self.floor.join();
         self.count_cells(own, scan);
@@ -290,10 +298,11 @@ impl Placer {
         let cells = self.floor.places.len();
         self.covered.clear();
         self.covered.resize(cells, false);
-        for spot in spots.iter().filter(|spot| spot.above_m > CUT_M) {
+        let placed = spots.iter().zip(&self.places);
+        for (spot, place) in placed.filter(|(spot, _)| spot.above_m > CUT_M) {
             let range_m = f64::from(scan.range_m()[spot.point as usize]);
             if spot.above_m < CUT_M + ABOVE_CUT_M.max(ABOVE_CUT_PER_M * range_m)
-                && let Some(cell) = self.floor.number(self.floor.place(spot.at_m))
+                && let Some(cell) = self.floor.number(*place)
             {
                 self.covered[cell] = true;
             }
@@ -312,8 +321,8 @@ impl Placer {
         self.part_of.clear();
         self.begins.clear();
         self.begins.resize(self.members.len() + 1, 0);
-        for spot in spots {
-            let cell = self.floor.number(self.floor.place(spot.at_m));
+        for (spot, place) in spots.iter().zip(&self.places) {
+            let cell = self.floor.number(*place);
             let part = cell.map(|cell| self.floor.parts[cell]);
             let part = part.filter(|part| {
                 let (count, covered) = self.members[*part as usize];
@@ -331,7 +340,7 @@ impl Placer {
     }
 }
 
-/// The patch of all spots from `begin` on.
+/// The patch of all spots from `begin` on, which are in the order of the scan.
 fn patch_of(spots: &[Spot], begin: usize, scan: &Scan) -> Patch {
     let mut patch = Patch {
         begin,
@@ -344,14 +353,16 @@ fn patch_of(spots: &[Spot], begin: usize, scan: &Scan) -> Patch {
         goes_on: false,
         is_suspect: false,
     };
-    let (mut oldest_s, mut newest_s) = (f64::MIN, f64::MAX);
     for spot in &spots[begin..] {
-        patch.low_m = patch.low_m.inf(&spot.at_m);
-        patch.high_m = patch.high_m.sup(&spot.at_m);
-        patch.floor_m = patch.floor_m.min(spot.above_m);
-        patch.top_m = patch.top_m.max(spot.above_m);
-        (oldest_s, newest_s) = (oldest_s.max(spot.age_s), newest_s.min(spot.age_s));
+        for axis in 0..2 {
+            patch.low_m[axis] = least(patch.low_m[axis], spot.at_m[axis]);
+            patch.high_m[axis] = greatest(patch.high_m[axis], spot.at_m[axis]);
+        }
+        patch.floor_m = least(patch.floor_m, spot.above_m);
+        patch.top_m = greatest(patch.top_m, spot.above_m);
     }
-    patch.over_seam = oldest_s - newest_s > 0.5 * scan.duration_s();
+    if let [oldest, .., newest] = &spots[begin..] {
+        patch.over_seam = oldest.age_s - newest.age_s > 0.5 * scan.duration_s();
+    }
     patch
 }
