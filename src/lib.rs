@@ -52,6 +52,7 @@ pub mod tally;
 
 // Comparisons of floats that vectorise.
 mod float;
+mod marks;
 
 // Integer microseconds.
 pub mod time;

@@ -5,6 +5,7 @@ use super::row::{self, Centre, Row};
 use super::window::Windows;
 use super::{ClusterParameters, Clusters};
 use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, Scan};
+use crate::marks::marked;
 
 /// The cluster step. Its buffers are made once.
 #[derive(Debug, Clone)]
@@ -82,7 +83,7 @@ impl Dbscan {
         self.open.clear();
         for layer in 0..MAX_LAYERS {
             let row = &self.rows[layer];
-            let open = row::marked(&row.is_open[..columns]);
+            let open = marked(&row.is_open[..columns]);
             let centres = open.map(|column| row.centre(layer, column, &self.parameters));
             self.open.extend(centres);
         }

@@ -6,6 +6,7 @@ use super::row::{self, Row};
 use super::runs::{Run, Runs};
 use super::window::Windows;
 use crate::cloud::{MAX_COLUMNS, MAX_LAYERS};
+use crate::marks::marked;
 
 /// Joins core points that are neighbours. Its buffers are made once.
 #[derive(Debug, Clone)]
@@ -74,7 +75,7 @@ impl Joiner {
     fn join_along_columns(&mut self, rows: &[Row], columns: usize) {
         for pair in rows.windows(2) {
             row::mark_meetings(&pair[0], &pair[1], columns, &mut self.meet[..]);
-            for column in row::marked(&self.meet[..columns]) {
+            for column in marked(&self.meet[..columns]) {
                 self.partition
                     .join(pair[0].run_of[column], pair[1].run_of[column]);
             }

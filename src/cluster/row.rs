@@ -301,17 +301,3 @@ pub(super) fn mark_meetings(row: &Row, above: &Row, columns: usize, marks: &mut 
         marks[column] &= !(is_same & meets[column - 1]);
     }
 }
-
-/// Columns that are marked, in order. Most are not, eight at once.
-pub(super) fn marked(marks: &[bool]) -> impl Iterator<Item = usize> {
-    const AT_ONCE: usize = 8;
-    let (eights, _) = marks.as_chunks::<AT_ONCE>();
-    let eights = eights.iter().enumerate();
-    let some = eights.filter(|(_, eight)| **eight != [false; AT_ONCE]);
-    let within = some.map(|(at, _)| AT_ONCE * at..AT_ONCE * (at + 1));
-    let rest = marks.len() / AT_ONCE * AT_ONCE..marks.len();
-    within
-        .chain([rest])
-        .flatten()
-        .filter(|column| marks[*column])
-}

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::Plane;
-use crate::cloud::Scan;
+use super::{Plane, passes};
+use crate::cloud::{CAPACITY, MAX_LAYERS, Scan};
 
 /// The lowest returns, slice by slice. The buffers are made once.
 #[derive(Debug, Clone)]
@@ -11,6 +11,8 @@ pub(super) struct Minima {
     per_segment: usize,
     segments: Vec<Vec<Minimum>>,
     points: Vec<(usize, Vector3<f64>)>,
+    /// Of all points; infinity where they do not count.
+    heights_m: Vec<f32>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -25,6 +27,7 @@ impl Minima {
             per_segment,
             segments: vec![Vec::with_capacity(per_segment); segments],
             points: Vec::with_capacity(segments * per_segment),
+            heights_m: Vec::with_capacity(CAPACITY),
         }
     }
 
@@ -33,17 +36,16 @@ impl Minima {
         for segment in &mut self.segments {
             segment.clear();
         }
-        let height_m = reference.heights();
+        self.heights_m.resize(scan.len(), 0.0);
         let far_squared = (range_m * range_m) as f32;
-        let (x_m, y_m, z_m) = (scan.x_m(), scan.y_m(), scan.z_m());
+        passes::heights_nearby(scan, reference, far_squared, &mut self.heights_m);
+        let heights_m = self.heights_m.as_chunks::<MAX_LAYERS>().0;
         for column in 0..scan.columns() {
             let slice = slice_of(scan, column, self.segments.len());
             let segment = &mut self.segments[slice];
-            for point in scan.index(column, 0)..scan.index(column + 1, 0) {
-                let near = x_m[point] * x_m[point] + y_m[point] * y_m[point] <= far_squared;
-                if near && scan.has_return(point) {
-                    let above_m = height_m(x_m[point], y_m[point], z_m[point]);
-                    let point = point as u32;
+            for (layer, above_m) in heights_m[column].into_iter().enumerate() {
+                if above_m < f32::INFINITY {
+                    let point = scan.index(column, layer) as u32;
                     insert(segment, self.per_segment, Minimum { above_m, point });
                 }
             }

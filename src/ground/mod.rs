@@ -2,9 +2,10 @@
 //!
 //! `minima` gathers the lowest returns of every pie slice, `ransac` finds the plane that most
 //! of them lie on, `plane` has the geometry, `surface` follows the heights above and below that
-//! plane outward, this file follows the plane from revolution to revolution and marks the points.
+//! plane outward, `passes` is what is done with all points at once, and this file follows the plane from revolution to revolution and marks the points.
 
 mod minima;
+mod passes;
 mod plane;
 mod ransac;
 mod surface;
@@ -13,11 +14,13 @@ pub use plane::Plane;
 
 use nalgebra::Vector3;
 
-use crate::cloud::{MAX_LAYERS, Scan};
+use crate::cloud::{CAPACITY, MAX_LAYERS, Scan};
+use crate::marks::marked;
 use crate::parameter::{choices, parameters};
 use crate::random::Random;
 use crate::track::Rectangle;
 use minima::Minima;
+use passes::Band;
 use surface::Surface;
 
 choices! {
@@ -138,6 +141,10 @@ pub struct Ground {
     mask: Vec<bool>,
     surface: Surface,
     heights_m: Vec<f32>,
+    /// Horizontal distances of the points.
+    distances_m: Vec<f32>,
+    /// Points that are looked at closer.
+    marks: Vec<bool>,
 }
 
 /// Sectors in which the surface is followed, of 5 degrees each.
@@ -159,11 +166,13 @@ impl Ground {
             misses: 0,
             revolutions: 0,
             minima: Minima::new(parameters.segments, parameters.lowest_per_segment),
-            near: Vec::with_capacity(crate::cloud::CAPACITY),
-            support: Vec::with_capacity(crate::cloud::CAPACITY),
-            mask: Vec::with_capacity(crate::cloud::CAPACITY),
+            near: Vec::with_capacity(CAPACITY),
+            support: Vec::with_capacity(CAPACITY),
+            mask: Vec::with_capacity(CAPACITY),
             surface: Surface::new(SECTORS),
-            heights_m: Vec::with_capacity(crate::cloud::CAPACITY),
+            heights_m: Vec::with_capacity(CAPACITY),
+            distances_m: Vec::with_capacity(CAPACITY),
+            marks: Vec::with_capacity(CAPACITY),
         }
     }
 
@@ -248,45 +257,37 @@ impl Ground {
             return;
         }
         let far_squared = (self.parameters.candidate_range_m.powi(2)) as f32;
-        let (near_m, above_m) = (near_m as f32, plane.heights());
-        let (x_m, y_m, z_m) = (scan.x_m(), scan.y_m(), scan.z_m());
-        for point in 0..scan.len() {
-            let [x, y, z] = [x_m[point], y_m[point], z_m[point]];
-            let wanted = above_m(x, y, z).abs() <= near_m
-                && x * x + y * y <= far_squared
-                && scan.has_return(point);
-            if wanted {
-                self.near.push(Vector3::new(x, y, z).map(f64::from));
-            }
-        }
+        self.marks.resize(scan.len(), false);
+        passes::mark_near(scan, plane, near_m as f32, far_squared, &mut self.marks);
+        let points = marked(&self.marks).map(|point| Vector3::from(scan.point_m(point)));
+        self.near.extend(points.map(|point| point.map(f64::from)));
     }
 
     fn mark(&mut self, scan: &Scan, plane: &Plane, vehicles: &[Rectangle]) -> usize {
-        let height_m = plane.heights();
-        let near_m = self.parameters.mark_distance_m as f32;
-        let per_m = self.parameters.mark_distance_per_m as f32;
-        let below = self.parameters.below_is_ground;
-        let (range_m, x_m, y_m, z_m) = (scan.range_m(), scan.x_m(), scan.y_m(), scan.z_m());
-        self.heights_m.clear();
-        self.heights_m
-            .extend((0..scan.len()).map(|point| height_m(x_m[point], y_m[point], z_m[point])));
+        let band = Band {
+            near_m: self.parameters.mark_distance_m as f32,
+            per_m: self.parameters.mark_distance_per_m as f32,
+            with_below: self.parameters.below_is_ground,
+        };
+        self.heights_m.resize(scan.len(), 0.0);
+        passes::heights(scan, plane, &mut self.heights_m);
         if self.parameters.model == Model::Surface {
-            self.surface.find(scan, &self.heights_m, vehicles);
-            for column in 0..scan.columns() {
-                let profile = self.surface.profile(column);
-                for point in (0..MAX_LAYERS).map(|layer| scan.index(column, layer)) {
-                    if range_m[point] > 0.0 {
-                        self.heights_m[point] -= profile.level_m(scan.distance_m(point));
-                    }
-                }
+            self.distances_m.resize(scan.len(), 0.0);
+            passes::distances(scan, &mut self.distances_m);
+            self.surface
+                .find(scan, &self.heights_m, &self.distances_m, vehicles);
+            for (columns, profile) in self.surface.stretches() {
+                let points = scan.index(columns.start, 0)..scan.index(columns.end, 0);
+                passes::lower(
+                    profile,
+                    &scan.range_m()[points.clone()],
+                    &self.distances_m[points.clone()],
+                    &mut self.heights_m[points],
+                );
             }
         }
-        self.mask.clear();
-        self.mask.extend((0..scan.len()).map(|point| {
-            let above_m = self.heights_m[point];
-            let limit_m = near_m + per_m * range_m[point];
-            range_m[point] > 0.0 && above_m <= limit_m && (below || above_m >= -limit_m)
-        }));
+        self.mask.resize(scan.len(), false);
+        passes::mark(scan, &self.heights_m, band, &mut self.mask);
         if self.parameters.model == Model::Surface {
             self.spare_feet(scan);
             for vehicle in vehicles {
@@ -321,24 +322,36 @@ impl Ground {
     /// below one that rises steeply from there and is no ground. Feet of people, tyres, bumpers
     /// and the foot of a wall lie as near to the ground as its own bumps do.
     fn spare_feet(&mut self, scan: &Scan) {
-        for column in 0..scan.columns() {
+        self.marks.resize(scan.len(), false);
+        passes::mark_edges(
+            &self.mask,
+            &self.heights_m,
+            &self.distances_m,
+            (FOOT_M, FOOT_PER_M),
+            &mut self.marks,
+        );
+        let columns = self.marks.as_chunks::<MAX_LAYERS>().0.iter().enumerate();
+        let (ranges_m, _) = scan.range_m().as_chunks::<MAX_LAYERS>();
+        let (heights_m, _) = self.heights_m.as_chunks::<MAX_LAYERS>();
+        let (distances_m, _) = self.distances_m.as_chunks::<MAX_LAYERS>();
+        let (mask, _) = self.mask.as_chunks_mut::<MAX_LAYERS>();
+        // What stands lies below an edge, or below what was found to stand.
+        for (column, _) in columns.filter(|(_, edges)| **edges != [false; MAX_LAYERS]) {
             let mut above: Option<(f32, f32)> = None;
             for layer in (0..MAX_LAYERS).rev() {
-                let point = scan.index(column, layer);
-                if !scan.has_return(point) {
+                if ranges_m[column][layer] <= 0.0 {
                     continue;
                 }
-                let distance_m = scan.distance_m(point);
-                let height_m = self.heights_m[point];
+                let distance_m = distances_m[column][layer];
+                let height_m = heights_m[column][layer];
                 let least_m = FOOT_M + FOOT_PER_M * distance_m;
                 let stands = above.is_some_and(|(upper_m, upper_distance_m)| {
                     height_m > least_m
                         && upper_m - height_m > STEEP * (upper_distance_m - distance_m).abs()
                 });
-                if stands {
-                    self.mask[point] = false;
-                }
-                above = (!self.mask[point]).then_some((height_m, distance_m));
+                let is_ground = &mut mask[column][layer];
+                *is_ground &= !stands;
+                above = (!*is_ground).then_some((height_m, distance_m));
             }
         }
     }

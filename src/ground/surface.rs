@@ -6,6 +6,8 @@
 //! plane below the vehicle, and neighbouring sectors vote, so that the side of a car, which
 //! fills a sector or two, is not taken for a rise.
 
+use std::ops::Range;
+
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::track::{Outline, Rectangle};
 
@@ -85,7 +87,18 @@ impl Surface {
     }
 
     /// Follows the ground of a revolution, given the heights of its points above the plane.
-    pub(super) fn find(&mut self, scan: &Scan, heights_m: &[f32], vehicles: &[Rectangle]) {
+    pub(super) fn find(
+        &mut self,
+        scan: &Scan,
+        heights_m: &[f32],
+        distances_m: &[f32],
+        vehicles: &[Rectangle],
+    ) {
+        let points = Points {
+            scan,
+            heights_m,
+            distances_m,
+        };
         self.sector_of.clear();
         let sectors = self.sectors;
         self.sector_of.extend((0..scan.columns()).map(|column| {
@@ -104,7 +117,7 @@ impl Surface {
                 .take_while(|other| **other == sector)
                 .count();
             self.look_out(scan.azimuth_rad(first + count / 2), vehicles);
-            self.measure_sector(scan, heights_m, first..first + count, sector as usize);
+            self.measure_sector(&points, first..first + count, sector as usize);
             first += count;
         }
         for rings in &mut self.rings {
@@ -158,13 +171,11 @@ impl Surface {
     }
 
     /// The low level of each layer in the columns of a sector.
-    fn measure_sector(
-        &mut self,
-        scan: &Scan,
-        heights_m: &[f32],
-        columns: std::ops::Range<usize>,
-        sector: usize,
-    ) {
+    fn measure_sector(&mut self, points: &Points<'_>, columns: Range<usize>, sector: usize) {
+        let scan = points.scan;
+        let (ranges_m, _) = scan.range_m().as_chunks::<MAX_LAYERS>();
+        let (heights_m, _) = points.heights_m.as_chunks::<MAX_LAYERS>();
+        let (distances_m, _) = points.distances_m.as_chunks::<MAX_LAYERS>();
         for levels in &mut self.levels {
             levels.clear();
         }
@@ -172,11 +183,10 @@ impl Surface {
             // Height and distance of the next return above.
             let mut above: Option<(f32, f32)> = None;
             for layer in (0..MAX_LAYERS).rev() {
-                let point = scan.index(column, layer);
-                if !scan.has_return(point) {
+                if ranges_m[column][layer] <= 0.0 {
                     continue;
                 }
-                let (level_m, distance_m) = (heights_m[point], scan.distance_m(point));
+                let (level_m, distance_m) = (heights_m[column][layer], distances_m[column][layer]);
                 let rises_steeply = above.is_some_and(|(upper_m, upper_distance_m)| {
                     upper_m - level_m > STEEP * (upper_distance_m - distance_m)
                 });
@@ -184,7 +194,7 @@ impl Surface {
                 let can_be_ground = !rises_steeply
                     && distance_m < FARTHEST_M
                     && level_m < HIGHEST_M + STEEPEST * distance_m;
-                if can_be_ground && !self.is_taken(scan.point_m(point)) {
+                if can_be_ground && !self.is_taken(scan.point_m(scan.index(column, layer))) {
                     self.levels[layer].push((level_m, distance_m));
                 }
             }
@@ -247,20 +257,39 @@ impl Surface {
         }
     }
 
-    /// How high the ground is above the plane in a column.
-    pub(super) fn profile(&self, column: usize) -> &Profile {
-        &self.profiles[self.sector_of[column] as usize]
+    /// The ground along the columns: stretches of them, and how high it is there above the plane.
+    pub(super) fn stretches(&self) -> impl Iterator<Item = (Range<usize>, &Profile)> {
+        let mut first = 0;
+        self.sector_of.chunk_by(|a, b| a == b).map(move |columns| {
+            let stretch = first..first + columns.len();
+            first = stretch.end;
+            (stretch, &self.profiles[columns[0] as usize])
+        })
     }
+}
+
+/// The points of a revolution.
+struct Points<'a> {
+    scan: &'a Scan,
+    /// Above the plane.
+    heights_m: &'a [f32],
+    distances_m: &'a [f32],
 }
 
 /// Heights above the plane along a direction: straight between knots.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Profile {
     count: usize,
-    distance_m: [f32; Self::MOST],
-    level_m: [f32; Self::MOST],
-    /// Behind each knot.
-    slope: [f32; Self::MOST],
+    knots: [Knot; Self::MOST],
+}
+
+/// Where the slope of the ground changes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Knot {
+    pub(super) distance_m: f32,
+    pub(super) level_m: f32,
+    /// Behind it.
+    pub(super) slope: f32,
 }
 
 impl Profile {
@@ -269,19 +298,26 @@ impl Profile {
 
     const FLAT: Self = Self {
         count: 1,
-        distance_m: [0.0; Self::MOST],
-        level_m: [0.0; Self::MOST],
-        slope: [0.0; Self::MOST],
+        knots: [Knot {
+            distance_m: 0.0,
+            level_m: 0.0,
+            slope: 0.0,
+        }; Self::MOST],
     };
+
+    /// Its knots from the inside out; the first one is below the sensor.
+    pub(super) fn knots(&self) -> &[Knot] {
+        &self.knots[..self.count]
+    }
 
     fn through(rings: &[Ring; MAX_LAYERS]) -> Self {
         let mut profile = Self::FLAT;
         let mut run_m = 0.0;
         for ring in rings {
             let last = profile.count - 1;
-            if ring.distance_m > profile.distance_m[last] {
-                run_m = ring.distance_m - profile.distance_m[last];
-                profile.slope[last] = (ring.level_m - profile.level_m[last]) / run_m;
+            if ring.distance_m > profile.knots[last].distance_m {
+                run_m = ring.distance_m - profile.knots[last].distance_m;
+                profile.knots[last].slope = (ring.level_m - profile.knots[last].level_m) / run_m;
                 profile.push(ring.distance_m, ring.level_m);
             }
         }
@@ -289,34 +325,30 @@ impl Profile {
         // so for two rings: a single rise is a kerb.
         let last = profile.count - 1;
         if last > 0 && run_m > SHORTEST_RUN_M {
-            let slope = profile.slope[last - 1].clamp(-STEEPEST, STEEPEST);
-            let before = last.checked_sub(2).map_or(0.0, |ring| profile.slope[ring]);
+            let slope = profile.knots[last - 1].slope.clamp(-STEEPEST, STEEPEST);
+            let before = last
+                .checked_sub(2)
+                .map_or(0.0, |ring| profile.knots[ring].slope);
             let slope = if slope > 0.0 {
                 slope.min(before.max(0.0))
             } else {
                 slope.max(before.min(0.0))
             };
-            profile.slope[last] = slope;
-            let (distance_m, level_m) = (profile.distance_m[last], profile.level_m[last]);
+            profile.knots[last].slope = slope;
+            let (distance_m, level_m) =
+                (profile.knots[last].distance_m, profile.knots[last].level_m);
             profile.push(distance_m + run_m, level_m + slope * run_m);
         }
         profile
     }
 
     fn push(&mut self, distance_m: f32, level_m: f32) {
-        self.distance_m[self.count] = distance_m;
-        self.level_m[self.count] = level_m;
-        self.slope[self.count] = 0.0;
+        self.knots[self.count] = Knot {
+            distance_m,
+            level_m,
+            slope: 0.0,
+        };
         self.count += 1;
-    }
-
-    /// Above the plane, `distance_m` away.
-    pub(super) fn level_m(&self, distance_m: f32) -> f32 {
-        let behind = self.distance_m[1..self.count]
-            .iter()
-            .take_while(|knot_m| **knot_m <= distance_m)
-            .count();
-        self.level_m[behind] + self.slope[behind] * (distance_m - self.distance_m[behind])
     }
 }
 
@@ -351,6 +383,14 @@ mod tests {
     use super::*;
     use crate::cloud::sensor::VLP16;
     use crate::cloud::tests::scan_of;
+    use crate::ground::passes::{distances, lower};
+
+    /// How high the ground is above the plane.
+    fn ground_m(profile: &Profile, distance_m: f32) -> f32 {
+        let mut height_m = [0.0];
+        lower(profile, &[distance_m], &[distance_m], &mut height_m);
+        -height_m[0]
+    }
 
     #[test]
     fn a_kerb_goes_on_level_and_a_slope_as_it_came() {
@@ -363,7 +403,7 @@ mod tests {
                     level_m,
                 };
             }
-            Profile::through(&rings).level_m(28.5)
+            ground_m(&Profile::through(&rings), 28.5)
         };
         assert_eq!(behind([0.0, 0.0, 0.12]), 0.12);
         assert_eq!(behind([0.0, 0.0, -0.12]), -0.12);
@@ -402,10 +442,16 @@ mod tests {
         let scan = rising_road(0.06);
         let mut surface = Surface::new(72);
         let heights_m: Vec<f32> = scan.z_m().iter().map(|z| z + 1.8).collect();
-        surface.find(&scan, &heights_m, &[]);
+        let mut distances_m = vec![0.0; scan.len()];
+        distances(&scan, &mut distances_m);
+        surface.find(&scan, &heights_m, &distances_m, &[]);
         for column in [10, 400, 1200] {
-            assert!(surface.profile(column).level_m(8.0).abs() < 0.1);
-            let level_m = surface.profile(column).level_m(20.0);
+            let mut stretches = surface.stretches();
+            let (_, profile) = stretches
+                .find(|(stretch, _)| stretch.contains(&column))
+                .unwrap();
+            assert!(ground_m(profile, 8.0).abs() < 0.1);
+            let level_m = ground_m(profile, 20.0);
             assert!((level_m - 0.6).abs() < 0.15, "{column}: {level_m}");
         }
     }
