@@ -5,13 +5,22 @@ const AT_ONCE: usize = 8;
 
 /// The places that are marked, in order. Where most are not, eight are passed over at once.
 pub(crate) fn marked(marks: &[bool]) -> impl Iterator<Item = usize> {
-    let (eights, _) = marks.as_chunks::<AT_ONCE>();
-    let eights = eights.iter().enumerate();
-    let some = eights.filter(|(_, eight)| **eight != [false; AT_ONCE]);
-    let within = some.map(|(at, _)| AT_ONCE * at..AT_ONCE * (at + 1));
-    let rest = marks.len() / AT_ONCE * AT_ONCE..marks.len();
-    let places = within.chain([rest]).flatten();
-    places.filter(|place| marks[*place])
+    let (eights, rest) = marks.as_chunks::<AT_ONCE>();
+    let mut last = [false; AT_ONCE];
+    last[..rest.len()].copy_from_slice(rest);
+    let mut eights = eights.iter().copied().chain([last]);
+    let mut begin = 0;
+    // A byte for each, the first one lowest; those that were given are taken out.
+    let mut word = 0u64;
+    std::iter::from_fn(move || {
+        while word == 0 {
+            word = u64::from_le_bytes(eights.next()?.map(u8::from));
+            begin += AT_ONCE;
+        }
+        let place = begin - AT_ONCE + word.trailing_zeros() as usize / 8;
+        word &= word - 1;
+        Some(place)
+    })
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 
 use super::Plane;
-use super::surface::Profile;
+use super::surface::{Knot, Profile};
 use crate::cloud::{MAX_LAYERS, Scan};
 
 /// Heights of all points above a plane.
@@ -80,20 +80,10 @@ pub(super) fn lower(
             &mut slope[..count],
         );
         for knot in profile.knots() {
-            for point in 0..count {
-                let is_behind = distances_m[point] >= knot.distance_m;
-                from_m[point] = if is_behind {
-                    knot.distance_m
-                } else {
-                    from_m[point]
-                };
-                level_m[point] = if is_behind {
-                    knot.level_m
-                } else {
-                    level_m[point]
-                };
-                slope[point] = if is_behind { knot.slope } else { slope[point] };
-            }
+            let Knot { distance_m, .. } = *knot;
+            choose(distances_m, distance_m, distance_m, from_m);
+            choose(distances_m, distance_m, knot.level_m, level_m);
+            choose(distances_m, distance_m, knot.slope, slope);
         }
         for point in 0..count {
             let ground_m = level_m[point] + slope[point] * (distances_m[point] - from_m[point]);
@@ -101,6 +91,19 @@ pub(super) fn lower(
             heights_m[point] -= if is_return { ground_m } else { 0.0 };
         }
         begin = end;
+    }
+}
+
+/// Sets what belongs to points no nearer than `from_m`.
+#[inline(always)]
+fn choose(distances_m: &[f32], from_m: f32, value: f32, chosen: &mut [f32]) {
+    for point in 0..distances_m.len().min(chosen.len()) {
+        let before = chosen[point];
+        chosen[point] = if distances_m[point] >= from_m {
+            value
+        } else {
+            before
+        };
     }
 }
 

@@ -180,21 +180,21 @@ impl Surface {
             levels.clear();
         }
         for column in columns {
-            // Height and distance of the next return above.
-            let mut above: Option<(f32, f32)> = None;
+            let (ranges_m, heights_m) = (&ranges_m[column], &heights_m[column]);
+            let distances_m = &distances_m[column];
+            // Of the next return above; above the highest nothing rises.
+            let (mut upper_m, mut upper_distance_m) = (f32::NEG_INFINITY, 0.0);
             for layer in (0..MAX_LAYERS).rev() {
-                if ranges_m[column][layer] <= 0.0 {
+                if ranges_m[layer] <= 0.0 {
                     continue;
                 }
-                let (level_m, distance_m) = (heights_m[column][layer], distances_m[column][layer]);
-                let rises_steeply = above.is_some_and(|(upper_m, upper_distance_m)| {
-                    upper_m - level_m > STEEP * (upper_distance_m - distance_m)
-                });
-                above = Some((level_m, distance_m));
+                let (level_m, distance_m) = (heights_m[layer], distances_m[layer]);
+                let rises_steeply = upper_m - level_m > STEEP * (upper_distance_m - distance_m);
+                (upper_m, upper_distance_m) = (level_m, distance_m);
                 let can_be_ground = !rises_steeply
-                    && distance_m < FARTHEST_M
-                    && level_m < HIGHEST_M + STEEPEST * distance_m;
-                if can_be_ground && !self.is_taken(scan.point_m(scan.index(column, layer))) {
+                    & (distance_m < FARTHEST_M)
+                    & (level_m < HIGHEST_M + STEEPEST * distance_m);
+                if can_be_ground && !self.is_taken(scan, scan.index(column, layer)) {
                     self.levels[layer].push((level_m, distance_m));
                 }
             }
@@ -217,10 +217,12 @@ impl Surface {
     }
 
     /// Whether a vehicle of the sector stands there.
-    fn is_taken(&self, [x, y, _]: [f32; 3]) -> bool {
-        let place_m = [f64::from(x), f64::from(y)];
-        let mut vehicles = self.vehicles.iter();
-        vehicles.any(|vehicle| vehicle.distance_m(place_m) < AROUND_VEHICLES_M)
+    fn is_taken(&self, scan: &Scan, point: usize) -> bool {
+        let [x, y, _] = scan.point_m(point).map(f64::from);
+        self.vehicles.iter().any(|vehicle| {
+            let distance_m = vehicle.distance_within_m([x, y], AROUND_VEHICLES_M);
+            distance_m.is_some_and(|distance_m| distance_m < AROUND_VEHICLES_M)
+        })
     }
 
     /// The median of neighbouring sectors' levels, layer by layer.
