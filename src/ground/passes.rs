@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 
 use super::Plane;
-use super::surface::{Knot, Profile};
+use super::surface::Profile;
 use crate::cloud::{MAX_LAYERS, Scan};
 
 /// Heights of all points above a plane.
@@ -71,39 +71,23 @@ pub(super) fn lower(
         let end = (begin + TOGETHER).min(ranges_m.len());
         let (ranges_m, distances_m) = (&ranges_m[begin..end], &distances_m[begin..end]);
         let heights_m = &mut heights_m[begin..end];
-        let (mut from_m, mut level_m, mut slope) =
-            ([0.0; TOGETHER], [0.0; TOGETHER], [0.0; TOGETHER]);
         let count = end - begin;
-        let (from_m, level_m, slope) = (
-            &mut from_m[..count],
-            &mut level_m[..count],
-            &mut slope[..count],
-        );
-        for knot in profile.knots() {
-            let Knot { distance_m, .. } = *knot;
-            choose(distances_m, distance_m, distance_m, from_m);
-            choose(distances_m, distance_m, knot.level_m, level_m);
-            choose(distances_m, distance_m, knot.slope, slope);
+        let mut behind = [0u32; TOGETHER];
+        let behind = &mut behind[..count];
+        let knots = profile.knots();
+        for knot in &knots[1..] {
+            let from_m = knot.distance_m;
+            for point in 0..count {
+                behind[point] += u32::from(distances_m[point] >= from_m);
+            }
         }
         for point in 0..count {
-            let ground_m = level_m[point] + slope[point] * (distances_m[point] - from_m[point]);
+            let knot = &knots[behind[point] as usize];
+            let ground_m = knot.level_m + knot.slope * (distances_m[point] - knot.distance_m);
             let is_return = ranges_m[point] > 0.0;
             heights_m[point] -= if is_return { ground_m } else { 0.0 };
         }
         begin = end;
-    }
-}
-
-/// Sets what belongs to points no nearer than `from_m`.
-#[inline(always)]
-fn choose(distances_m: &[f32], from_m: f32, value: f32, chosen: &mut [f32]) {
-    for point in 0..distances_m.len().min(chosen.len()) {
-        let before = chosen[point];
-        chosen[point] = if distances_m[point] >= from_m {
-            value
-        } else {
-            before
-        };
     }
 }
 
