@@ -48,6 +48,9 @@ pub struct Publisher {
     sender_stamp: u32,
     bytes: Vec<u8>,
     ends: Vec<usize>,
+    /// The objects that are sent, and their list.
+    kept: Vec<Object>,
+    list: ObjectList,
 }
 
 /// What a revolution's messages say beside its objects.
@@ -73,6 +76,8 @@ impl Publisher {
             sender_stamp,
             bytes: vec![],
             ends: vec![],
+            kept: vec![],
+            list: ObjectList::default(),
         }
     }
 
@@ -88,14 +93,23 @@ impl Publisher {
     pub fn publish(&mut self, heading: &Heading<'_>, objects: &[Object], grid: &mut Grid) {
         self.bytes.clear();
         self.ends.clear();
-        let (kept, omitted) = nearest(objects, self.parameters.most_objects, &heading.sweep.sensor);
+        let mut kept = std::mem::take(&mut self.kept);
+        keep_nearest(
+            objects,
+            self.parameters.most_objects,
+            &heading.sweep.sensor,
+            &mut kept,
+        );
         let postmark = Postmark {
             sent: heading.sent,
             sampled: heading.time,
             sender_stamp: self.sender_stamp,
         };
         if self.parameters.object_list {
-            self.put(&postmark, &object_list_of(heading, &kept, omitted));
+            let mut list = std::mem::take(&mut self.list);
+            fill_list(&mut list, heading, &kept, objects.len() - kept.len());
+            self.put(&postmark, &list);
+            self.list = list;
         }
         if self.parameters.opendlv {
             self.put_opendlv(&postmark, heading, &kept);
@@ -107,6 +121,7 @@ impl Publisher {
                 &environment_of(heading.time + validity, &kept, &heading.sweep.sensor),
             );
         }
+        self.kept = kept;
         grid.publish(heading.time, heading.sweep, |tile| {
             self.put(&postmark, tile)
         });
@@ -117,7 +132,7 @@ impl Publisher {
         self.ends.push(self.bytes.len());
     }
 
-    fn put_opendlv(&mut self, postmark: &Postmark, heading: &Heading<'_>, objects: &[&Object]) {
+    fn put_opendlv(&mut self, postmark: &Postmark, heading: &Heading<'_>, objects: &[Object]) {
         let object_frame_id = heading.revolution;
         self.put(postmark, &opendlv::ObjectFrameStart { object_frame_id });
         let unit = match self.parameters.opendlv_angles {
@@ -165,21 +180,20 @@ impl Publisher {
     }
 }
 
-/// The objects that a list has room for, in their order, and how many it has none for.
-fn nearest<'a>(objects: &'a [Object], most: usize, sensor: &Pose) -> (Vec<&'a Object>, usize) {
-    let mut kept: Vec<&Object> = objects.iter().collect();
+/// Keeps the objects that a list has room for, in their order.
+fn keep_nearest(objects: &[Object], most: usize, sensor: &Pose, kept: &mut Vec<Object>) {
+    kept.clear();
+    kept.extend_from_slice(objects);
     if kept.len() > most {
         let distance = |object: &Object| Sight::of(object, sensor).distance_m;
         kept.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
         kept.truncate(most);
         kept.sort_by_key(|object| object.id);
     }
-    let omitted = objects.len() - kept.len();
-    (kept, omitted)
 }
 
-fn object_list_of(heading: &Heading<'_>, objects: &[&Object], omitted: usize) -> ObjectList {
-    let message = |object: &&Object| object_list::Object {
+fn fill_list(list: &mut ObjectList, heading: &Heading<'_>, objects: &[Object], omitted: usize) {
+    let message = |object: &Object| object_list::Object {
         object_id: object.id,
         classification: object.class.number(),
         class_probability: object.class_probability as f32,
@@ -205,7 +219,10 @@ fn object_list_of(heading: &Heading<'_>, objects: &[&Object], omitted: usize) ->
     };
     let vehicle = heading.sweep.vehicle;
     let [ego_x, ego_y, ego_z] = vehicle.map_or([0.0; 3], |pose| pose.position_m);
-    ObjectList {
+    let mut messages = std::mem::take(&mut list.objects.0);
+    messages.clear();
+    messages.extend(objects.iter().map(message));
+    *list = ObjectList {
         revolution: heading.revolution,
         frame: heading.sweep.frame.number(),
         ego_known: vehicle.is_some(),
@@ -216,12 +233,12 @@ fn object_list_of(heading: &Heading<'_>, objects: &[&Object], omitted: usize) ->
         count: objects.len() as u32,
         omitted: omitted as u32,
         processing_time: heading.processing_s,
-        objects: List(objects.iter().map(message).collect()),
-    }
+        objects: List(messages),
+    };
 }
 
-fn environment_of(valid_until: Time, objects: &[&Object], sensor: &Pose) -> Environment {
-    let message = |object: &&Object| {
+fn environment_of(valid_until: Time, objects: &[Object], sensor: &Pose) -> Environment {
+    let message = |object: &Object| {
         let sight = Sight::of(object, sensor);
         PerceivedObject {
             identified: TimeStamp::from(object.first_seen),

@@ -16,6 +16,8 @@ pub(super) struct Updates {
     budget_bytes_per_s: f64,
     round_s: f64,
     tile_bytes: usize,
+    /// Cells that are being encoded.
+    encoded: Vec<u8>,
     radius_tiles: f64,
     /// Bytes that may be sent now.
     allowance: f64,
@@ -39,6 +41,8 @@ const MOST_FOR_CHANGE: f64 = 0.75;
 const SAVED_S: f64 = 0.25;
 /// What a frame has around the cells of its tile, about.
 const AROUND_CELLS: usize = 96;
+/// Bytes of the cells at most, if every one is a run of its own.
+const MOST_BYTES: usize = TILE_CELLS * TILE_CELLS + 1;
 
 impl Updates {
     pub(super) fn new(parameters: &GridParameters) -> Self {
@@ -47,6 +51,7 @@ impl Updates {
             budget_bytes_per_s: 1000.0 * parameters.budget_kb_per_s,
             round_s: parameters.refresh_s / parameters.refresh_rounds as f64,
             tile_bytes: parameters.tile_bytes,
+            encoded: Vec::with_capacity(MOST_BYTES),
             radius_tiles: parameters.reach_m / tile_m + 1.0,
             allowance: 0.0,
             last: None,
@@ -69,7 +74,7 @@ impl Updates {
                 break;
             }
             let tile = map.tile_mut(candidate.place);
-            encode(tile, self.tile_bytes);
+            encode(tile, self.tile_bytes, &mut self.encoded);
             self.allowance -= (AROUND_CELLS + tile.encoded.len()) as f64;
             (tile.waits_from, tile.change, tile.is_known) = (Some(now), 0, true);
             self.chosen.push(candidate.place);
@@ -108,22 +113,23 @@ impl Updates {
 
 /// Writes a tile's cells as they are sent, if they changed since. Where they take too many bytes
 /// all that is free becomes alike, and all that is occupied.
-fn encode(tile: &mut Tile, most_bytes: usize) {
+fn encode(tile: &mut Tile, most_bytes: usize, encoded: &mut Vec<u8>) {
     if tile.encoded_revision == Some(tile.revision) {
         return;
     }
     tile.encoded_revision = Some(tile.revision);
-    let mut encoded = std::mem::take(&mut tile.encoded);
     let mut levels = [0; TILE_CELLS * TILE_CELLS];
     for (level_of, log_odds) in levels.iter_mut().zip(&tile.log_odds) {
         *level_of = level(*log_odds);
     }
-    grid_tile::encode_cells(&levels, TILE_CELLS, &mut encoded);
+    grid_tile::encode_cells(&levels, TILE_CELLS, encoded);
     if encoded.len() + AROUND_CELLS > most_bytes {
         levels = levels.map(|level| level.signum() * grid_tile::LEVELS);
-        grid_tile::encode_cells(&levels, TILE_CELLS, &mut encoded);
+        grid_tile::encode_cells(&levels, TILE_CELLS, encoded);
     }
-    tile.encoded = encoded;
+    tile.encoded.clear();
+    tile.encoded.reserve(most_bytes.min(MOST_BYTES));
+    tile.encoded.extend_from_slice(encoded);
 }
 
 #[cfg(test)]
@@ -227,10 +233,10 @@ mod tests {
                 -600
             };
         }
-        encode(tile, 65_000);
+        encode(tile, 65_000, &mut vec![]);
         let full = tile.encoded.len();
         note(tile, 1, 2);
-        encode(tile, 1400);
+        encode(tile, 1400, &mut vec![]);
         assert!(
             full > 1400 && tile.encoded.len() < 1400,
             "{full} {}",

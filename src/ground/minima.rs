@@ -40,10 +40,10 @@ impl Minima {
         let far_squared = (range_m * range_m) as f32;
         passes::heights_nearby(scan, reference, far_squared, &mut self.heights_m);
         let heights_m = self.heights_m.as_chunks::<MAX_LAYERS>().0;
-        for column in 0..scan.columns() {
+        for (column, heights_m) in heights_m.iter().enumerate() {
             let slice = slice_of(scan, column, self.segments.len());
             let segment = &mut self.segments[slice];
-            for (layer, above_m) in heights_m[column].into_iter().enumerate() {
+            for (layer, above_m) in heights_m.iter().copied().enumerate() {
                 if above_m < f32::INFINITY {
                     let point = scan.index(column, layer) as u32;
                     insert(segment, self.per_segment, Minimum { above_m, point });

@@ -41,8 +41,8 @@ pub(super) fn heights_nearby(scan: &Scan, plane: &Plane, far_squared: f32, heigh
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 pub(super) fn distances(scan: &Scan, distances_m: &mut [f32]) {
     let mut cosines = [0.0f32; MAX_LAYERS];
-    for layer in 0..MAX_LAYERS {
-        cosines[layer] = scan.slope(layer).1 as f32;
+    for (layer, cosine) in cosines.iter_mut().enumerate() {
+        *cosine = scan.slope(layer).1 as f32;
     }
     let ranges_m = scan.range_m().as_chunks::<MAX_LAYERS>().0;
     let distances_m = distances_m.as_chunks_mut::<MAX_LAYERS>().0;

@@ -20,6 +20,12 @@ pub(super) struct Grouping {
     sorted: Vec<Spot>,
     patches: Vec<Patch>,
     groups: Vec<Group>,
+    /// Where the tracks are expected, and which of them may be in a patch.
+    forecasts: Vec<Forecast>,
+    near: Vec<usize>,
+    /// The bounds of each group, and the one that it joins.
+    boxes: Vec<[Vector2<f64>; 2]>,
+    target: Vec<usize>,
     /// Group numbers of what was cut off structure, ascending.
     suspects: Vec<u32>,
 }
@@ -35,6 +41,7 @@ pub(super) struct Group {
 }
 
 /// Where a track is expected.
+#[derive(Debug, Clone)]
 struct Forecast {
     rectangle: Rectangle,
     outline: Outline,
@@ -98,7 +105,7 @@ impl Grouping {
         self.suspects.binary_search(&number).is_ok()
     }
 
-    fn forecasts(tracks: &[Track]) -> Vec<Forecast> {
+    fn forecast(&mut self, tracks: &[Track]) {
         let forecast = |track: &Track| {
             let rectangle = track.rectangle();
             let margin_m = (LEAST_MARGIN_M + track.spread_m()).min(MOST_MARGIN_M);
@@ -112,15 +119,16 @@ impl Grouping {
                 yaw_rad: track.yaw_rad(),
             }
         };
-        tracks.iter().map(forecast).collect()
+        self.forecasts.clear();
+        self.forecasts.extend(tracks.iter().map(forecast));
     }
 
     /// Gives every spot a group: the track in whose place it lies, or its own cluster.
     fn divide(&mut self, tracks: &[Track], parameters: &TrackParameters, scan: &Scan) {
-        let forecasts = Self::forecasts(tracks);
+        self.forecast(tracks);
+        let (forecasts, near) = (&self.forecasts, &mut self.near);
         let count = tracks.len();
         self.suspects.clear();
-        let mut near = vec![];
         for (number, patch) in self.patches.iter().enumerate() {
             if patch.is_suspect {
                 self.suspects.push((count + number) as u32);
@@ -274,9 +282,14 @@ impl Grouping {
 
     /// Joins free groups that stand close together and can be one vehicle.
     fn join_pieces(&mut self, tracks: &[Track], scene: &Scene<'_>) {
-        let boxes: Vec<[Vector2<f64>; 2]> =
-            self.groups.iter().map(|group| self.bounds(group)).collect();
-        let mut target: Vec<usize> = (0..self.groups.len()).collect();
+        let (mut boxes, mut target) = (
+            std::mem::take(&mut self.boxes),
+            std::mem::take(&mut self.target),
+        );
+        boxes.clear();
+        boxes.extend(self.groups.iter().map(|group| self.bounds(group)));
+        target.clear();
+        target.extend(0..self.groups.len());
         let mut joined = false;
         for a in 0..self.groups.len() {
             for b in a + 1..self.groups.len() {
@@ -304,9 +317,6 @@ impl Grouping {
                 (*target, joined) = (owner, true);
             }
         }
-        if !joined {
-            return;
-        }
         for (number, group) in self.groups.iter().enumerate() {
             if target[number] != number {
                 let to = self.spots[self.groups[target[number]].begin].group;
@@ -315,7 +325,10 @@ impl Grouping {
                 }
             }
         }
-        self.gather(tracks, scene);
+        (self.boxes, self.target) = (boxes, target);
+        if joined {
+            self.gather(tracks, scene);
+        }
     }
 
     /// The group of a vehicle whose bumper or rear a free group can be: a bonnet that rises

@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::assignment::assign;
+use super::assignment::Assigner;
 use super::grouping::Grouping;
 use super::road_user::Track;
 use super::sight::Sight;
@@ -22,6 +22,14 @@ pub(super) struct ObjectTracker {
     objects: Vec<Object>,
     grouping: Grouping,
     outline: Vec<[f64; 2]>,
+    cost: Vec<f64>,
+    assigner: Assigner,
+    /// The group of each track.
+    pairs: Vec<Option<usize>>,
+    /// Where the tracks are.
+    known: Vec<Outline>,
+    /// The same when the groups are taken in, with their widths and how likely they exist.
+    places: Vec<(Rectangle, Outline, f64)>,
 }
 
 /// Returns of a single low layer that show a vehicle.
@@ -82,9 +90,9 @@ impl ObjectTracker {
         self.predict(scene, end);
         self.grouping
             .form(&self.tracks, clusters, scene, parameters);
-        let pairs = self.pair(parameters);
-        self.update(&pairs, scene, end);
-        self.begin(&pairs, scene, end, parameters);
+        self.pair(parameters);
+        self.update(scene, end);
+        self.begin(scene, end, parameters);
         self.tidy(end, parameters);
         self.publish(end, parameters);
     }
@@ -103,10 +111,12 @@ impl ObjectTracker {
     }
 
     /// The cheapest pairing of tracks with groups.
-    fn pair(&self, parameters: &TrackParameters) -> Vec<Option<usize>> {
+    fn pair(&mut self, parameters: &TrackParameters) {
         let groups = self.grouping.groups();
         let (rows, columns) = (self.tracks.len(), groups.len());
-        let mut cost = vec![f64::MAX; rows * columns];
+        let cost = &mut self.cost;
+        cost.clear();
+        cost.resize(rows * columns, f64::MAX);
         for (row, track) in self.tracks.iter().enumerate() {
             let outline = track.rectangle().outline();
             let leap_m =
@@ -123,16 +133,19 @@ impl ObjectTracker {
             }
         }
         // Costs may be below 0 by the bonus; all pairs are shifted alike.
-        for cost in &mut cost {
+        for cost in cost.iter_mut() {
             *cost += CLAIM_BONUS;
         }
-        assign(rows, columns, &cost, GATE + CLAIM_BONUS)
+        let most = GATE + CLAIM_BONUS;
+        let pairs = self.assigner.assign(rows, columns, cost, most);
+        self.pairs.clear();
+        self.pairs.extend_from_slice(pairs);
     }
 
-    fn update(&mut self, pairs: &[Option<usize>], scene: &Scene<'_>, end: Time) {
+    fn update(&mut self, scene: &Scene<'_>, end: Time) {
         let placement = scene.sweep.sensor.placement();
         let sensor_height_m = scene.ground.plane.height_m();
-        for (track, pair) in self.tracks.iter_mut().zip(pairs) {
+        for (track, pair) in self.tracks.iter_mut().zip(&self.pairs) {
             match pair.map(|number| &self.grouping.groups()[number]) {
                 Some(group) => {
                     let spots = self.grouping.spots(group);
@@ -150,23 +163,16 @@ impl ObjectTracker {
     }
 
     /// New tracks from what no track explains.
-    fn begin(
-        &mut self,
-        pairs: &[Option<usize>],
-        scene: &Scene<'_>,
-        end: Time,
-        parameters: &TrackParameters,
-    ) {
-        let known: Vec<Outline> = self
-            .tracks
-            .iter()
-            .map(|track| track.rectangle().outline())
-            .collect();
+    fn begin(&mut self, scene: &Scene<'_>, end: Time, parameters: &TrackParameters) {
+        let outlines = self.tracks.iter().map(|track| track.rectangle().outline());
+        self.known.clear();
+        self.known.extend(outlines);
         for (number, group) in self.grouping.groups().iter().enumerate() {
-            if pairs.contains(&Some(number)) || group.claimed_by.is_some() {
+            if self.pairs.contains(&Some(number)) || group.claimed_by.is_some() {
                 continue;
             }
-            let is_piece = known
+            let is_piece = self
+                .known
                 .iter()
                 .any(|place| place.contains(group.look.middle_m.into()));
             let spots = self.grouping.spots(group);
@@ -200,14 +206,12 @@ impl ObjectTracker {
             .tracks
             .extract_if(.., |track| track.is_gone(parameters));
         self.lost.extend(gone.filter(|track| track.may_return(end)));
-        let places: Vec<(Rectangle, Outline, f64)> = self
-            .tracks
-            .iter()
-            .map(|track| {
-                let place = track.rectangle();
-                (place, place.outline(), track.odds())
-            })
-            .collect();
+        let places = &mut self.places;
+        places.clear();
+        places.extend(self.tracks.iter().map(|track| {
+            let place = track.rectangle();
+            (place, place.outline(), track.odds())
+        }));
         let mut number = 0;
         let doubled = self.tracks.extract_if(.., |track| {
             let own = number;

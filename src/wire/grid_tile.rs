@@ -89,14 +89,19 @@ pub enum TileError {
 pub fn encode_cells(levels: &[i16], side: usize, out: &mut Vec<u8>) {
     out.clear();
     let (mut difference, mut count) = (0, 0);
-    let none = vec![0; side];
-    let mut south = &none[..];
+    let mut south: Option<&[i16]> = None;
     for row in levels.chunks(side) {
-        if difference == 0 && row == south {
+        let is_same = match south {
+            Some(south) => row == south,
+            None => row.iter().all(|level| *level == 0),
+        };
+        if difference == 0 && is_same {
             count += side as u64;
+            south = Some(row);
             continue;
         }
-        for (level, south) in row.iter().zip(south) {
+        for (at, level) in row.iter().enumerate() {
+            let south = south.map_or(0, |south| south[at]);
             let next = ((level - south) & 15) as u64;
             if next != difference && count > 0 {
                 super::protobuf::put_varint(out, count << 4 | difference);
@@ -104,7 +109,7 @@ pub fn encode_cells(levels: &[i16], side: usize, out: &mut Vec<u8>) {
             }
             (difference, count) = (next, count + 1);
         }
-        south = row;
+        south = Some(row);
     }
     super::protobuf::put_varint(out, count << 4 | difference);
 }
