@@ -102,8 +102,9 @@ impl Dbscan {
         let mut found = 0;
         for (layer, reach) in self.layers(centre) {
             let stretches = self.windows.stretches(centre.column, reach, reach);
-            let counts = stretches.map(|stretch| row::count(&self.rows[layer], stretch, centre));
-            found += counts.into_iter().sum::<u32>();
+            for stretch in stretches.into_iter().filter(|stretch| !stretch.is_empty()) {
+                found += row::count(&self.rows[layer], stretch, centre);
+            }
             if found >= needed {
                 break;
             }

@@ -14,7 +14,7 @@ pub(super) struct Joiner {
     pub(super) runs: Runs,
     /// Runs that belong together, by their numbers.
     pub(super) partition: Partition,
-    meet: Box<[bool; MAX_COLUMNS]>,
+    column_marks: Box<[bool; MAX_COLUMNS]>,
     marks: Box<[u32; MAX_COLUMNS]>,
 }
 
@@ -41,7 +41,7 @@ impl Joiner {
         Self {
             runs: Runs::default(),
             partition: Partition::default(),
-            meet: Box::new([false; MAX_COLUMNS]),
+            column_marks: Box::new([false; MAX_COLUMNS]),
             marks: Box::new([0; MAX_COLUMNS]),
         }
     }
@@ -50,10 +50,9 @@ impl Joiner {
     /// then run by run with the runs of the same layer and of those above, because neighbours
     /// see each other.
     pub(super) fn join(&mut self, rows: &mut [Row], points: Points<'_>) {
+        let goes_on = |row: &Row, layer, last, next| points.sees(row, layer, last, next);
         self.runs
-            .find(points.columns, rows, |row, layer, last, next| {
-                points.sees(row, layer, last, next)
-            });
+            .find(points.columns, rows, &mut self.column_marks[..], goes_on);
         self.partition.reset(self.runs.count());
         self.join_along_columns(rows, points.columns);
         for layer in 0..MAX_LAYERS {
@@ -74,8 +73,8 @@ impl Joiner {
     /// Joins the runs that have neighbours in one column of two layers that follow each other.
     fn join_along_columns(&mut self, rows: &[Row], columns: usize) {
         for pair in rows.windows(2) {
-            row::mark_meetings(&pair[0], &pair[1], columns, &mut self.meet[..]);
-            for column in marked(&self.meet[..columns]) {
+            row::mark_meetings(&pair[0], &pair[1], columns, &mut self.column_marks[..]);
+            for column in marked(&self.column_marks[..columns]) {
                 self.partition
                     .join(pair[0].run_of[column], pair[1].run_of[column]);
             }
@@ -100,7 +99,8 @@ fn join_run(
         let Some(reach) = reach else {
             break;
         };
-        for stretch in points.windows.around(&run.columns, reach) {
+        let stretches = points.windows.around(&run.columns, reach);
+        for stretch in stretches.into_iter().filter(|stretch| !stretch.is_empty()) {
             let own = (run, partition.find(run.number));
             // Those before it in its layer have seen it.
             let near = runs.of(other).near(

@@ -295,9 +295,30 @@ pub(super) fn mark_meetings(row: &Row, above: &Row, columns: usize, marks: &mut 
     for column in 0..columns {
         marks[column] = meets[column] & core[column] & core2[column];
     }
-    // Backwards, because each looks at the one before.
-    for column in (1..columns).rev() {
-        let is_same = (run[column] == run[column - 1]) & (run2[column] == run2[column - 1]);
-        marks[column] &= !(is_same & meets[column - 1]);
+    if columns == 0 {
+        return;
+    }
+    let (run_before, run2_before) = (&run[..columns - 1], &run2[..columns - 1]);
+    let (run, run2) = (&run[1..], &run2[1..]);
+    let marks = &mut marks[1..];
+    for at in 0..columns - 1 {
+        let is_same = (run[at] == run_before[at]) & (run2[at] == run2_before[at]);
+        marks[at] &= !(is_same & meets[at]);
+    }
+}
+
+/// Marks the columns where a stretch of core points that follow each other begins, and those
+/// behind where one ends.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub(super) fn mark_edges(row: &Row, columns: usize, marks: &mut [bool]) {
+    if columns == 0 {
+        return;
+    }
+    marks[0] = row.core[0];
+    let (before, core) = (&row.core[..columns - 1], &row.core[1..columns]);
+    let follows = &row.follows[1..columns];
+    let marks = &mut marks[1..columns];
+    for at in 0..columns - 1 {
+        marks[at] = (before[at] | core[at]) & !(before[at] & core[at] & follows[at]);
     }
 }

@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::row::Row;
+use super::row::{self, Row};
 use crate::cloud::{MAX_COLUMNS, MAX_LAYERS};
 use crate::float::{greatest, least};
+use crate::marks::marked;
 
 /// Core points of one layer, each a neighbour of the one before.
 #[derive(Debug, Clone)]
@@ -96,42 +97,33 @@ impl LayerRuns {
         first: u32,
         columns: usize,
         row: &mut Row,
+        marks: &mut [bool],
         goes_on: impl Fn(&Row, usize, usize) -> bool,
     ) -> u32 {
         self.runs.clear();
         self.first = first;
         row.run_of[..columns].fill(Row::NO_RUN);
-        let mut column = 0;
-        loop {
-            let from = column;
-            let is_core = |column: &usize| row.core[*column];
-            column = (column..columns).find(is_core).unwrap_or(columns);
-            let runs = self.runs.len() as u32;
-            for begun in &mut self.begun[from..column] {
-                *begun = runs;
+        row::mark_edges(row, columns, marks);
+        let mut edges = marked(&marks[..columns]).chain([columns]).peekable();
+        let mut noted = 0;
+        while let Some(begin) = edges.next() {
+            if begin == columns || !row.core[begin] {
+                continue;
             }
-            if column == columns {
-                break;
-            }
-            let begin = column;
-            column += 1;
-            while column < columns && row.core[column] && row.follows[column] {
-                column += 1;
-            }
+            let end = edges.peek().copied().unwrap_or(columns);
+            self.note_begun(noted..begin);
             let last = self.runs.last_mut();
             match last.filter(|last| goes_on(row, last.columns.end - 1, begin)) {
-                Some(last) => last.extend(begin..column, row),
+                Some(last) => last.extend(begin..end, row),
                 None => {
                     let mut run = Run::begin(first + self.runs.len() as u32, begin);
-                    run.extend(begin..column, row);
+                    run.extend(begin..end, row);
                     self.runs.push(run);
                 }
             }
-            let runs = self.runs.len() as u32;
-            for begun in &mut self.begun[begin..column] {
-                *begun = runs;
-            }
+            noted = begin;
         }
+        self.note_begun(noted..columns);
         for (corner, metres) in self.bounds_m.iter_mut().enumerate() {
             metres.clear();
             metres.extend(self.runs.iter().map(|run| match corner {
@@ -140,6 +132,14 @@ impl LayerRuns {
             }));
         }
         first + self.runs.len() as u32
+    }
+
+    /// Notes for a stretch of columns how many runs begin in or before them.
+    fn note_begun(&mut self, stretch: Range<usize>) {
+        let runs = self.runs.len() as u32;
+        for begun in &mut self.begun[stretch] {
+            *begun = runs;
+        }
     }
 
     /// The runs that reach into a stretch of columns, by their places.
@@ -231,12 +231,13 @@ impl Runs {
         &mut self,
         columns: usize,
         rows: &mut [Row],
+        marks: &mut [bool],
         goes_on: impl Fn(&Row, usize, usize, usize) -> bool,
     ) {
         self.count = 0;
         for (layer, (runs, row)) in self.layers.iter_mut().zip(rows).enumerate() {
             let goes_on = |row: &Row, last, next| goes_on(row, layer, last, next);
-            self.count = runs.find(self.count, columns, row, goes_on);
+            self.count = runs.find(self.count, columns, row, marks, goes_on);
         }
     }
 
