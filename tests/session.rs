@@ -270,7 +270,7 @@ fn the_example_draws_the_map_from_the_session_and_refuses_a_damaged_tile() {
         let folder = tempfile::tempdir().unwrap();
         let picture = folder.path().join("map.png");
         let script = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts/map");
-        let arguments = [script, text(&picture), "--cid=111", "--seconds=3"];
+        let arguments = [script, text(&picture), "--cid=111", "--seconds=6"];
         let example = Running::start("python3", &arguments);
         let peer = Peer::join();
         // It compiles the messages before it listens.
