@@ -15,8 +15,8 @@ pub struct Dbscan {
     rows: Vec<Row>,
     /// Which of many pairs are neighbours, while they are counted.
     near: Box<[f32; MAX_COLUMNS]>,
-    /// Points that their nearest along the layer do not make core points; later those of them
-    /// that are none but have neighbours.
+    /// Points that their nearest do not make core points; later those of them that are none but
+    /// have neighbours.
     open: Vec<Centre>,
     joiner: Joiner,
     /// First core point of each set of runs, and the set.
@@ -78,7 +78,8 @@ impl Dbscan {
         &self.clusters
     }
 
-    /// Looks closer at the points of which the nearest along their layer did not say enough.
+    /// Looks closer at the points of which the nearest along and across their layer did not say
+    /// enough.
     fn find_core_points(&mut self, columns: usize) {
         self.open.clear();
         for layer in 0..MAX_LAYERS {

@@ -14,8 +14,9 @@ pub(super) struct Joiner {
     pub(super) runs: Runs,
     /// Runs that belong together, by their numbers.
     pub(super) partition: Partition,
+    /// Columns and runs that are looked at closer, for a moment.
     column_marks: Box<[bool; MAX_COLUMNS]>,
-    marks: Box<[u32; MAX_COLUMNS]>,
+    run_marks: Box<[u32; MAX_COLUMNS]>,
 }
 
 /// What is known of a revolution's points before they are joined.
@@ -42,7 +43,7 @@ impl Joiner {
             runs: Runs::default(),
             partition: Partition::default(),
             column_marks: Box::new([false; MAX_COLUMNS]),
-            marks: Box::new([0; MAX_COLUMNS]),
+            run_marks: Box::new([0; MAX_COLUMNS]),
         }
     }
 
@@ -62,7 +63,7 @@ impl Joiner {
                     (layer, run),
                     &self.runs,
                     &mut self.partition,
-                    &mut self.marks,
+                    &mut self.run_marks,
                     rows,
                     points,
                 );

@@ -20,12 +20,12 @@ pub(super) struct Row {
     /// Neighbours that were counted so far.
     close: Box<[f32; MAX_COLUMNS]>,
     /// Whether it is a neighbour of the point in the column before.
-    pub(super) follows: Box<[bool; MAX_COLUMNS]>,
+    follows: Box<[bool; MAX_COLUMNS]>,
     /// Whether it is a neighbour of the point above it.
     meets: Box<[bool; MAX_COLUMNS]>,
     /// Whether it is a core point.
     pub(super) core: Box<[bool; MAX_COLUMNS]>,
-    /// Whether the next few do not suffice to call it one.
+    /// Whether the neighbours that were counted do not suffice to call it one.
     pub(super) is_open: Box<[bool; MAX_COLUMNS]>,
     /// Number of the run of each core point, or [`Row::NO_RUN`].
     pub(super) run_of: Box<[u32; MAX_COLUMNS]>,

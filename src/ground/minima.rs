@@ -86,7 +86,7 @@ impl Minima {
 }
 
 /// The slice of a column by its azimuth, wherever the revolution begins.
-fn slice_of(scan: &Scan, column: usize, segments: usize) -> usize {
+pub(super) fn slice_of(scan: &Scan, column: usize, segments: usize) -> usize {
     let turns = scan.azimuth_rad(column) / std::f64::consts::TAU;
     let part = turns - libm::floor(turns);
     ((part * segments as f64) as usize).min(segments - 1)

@@ -2,7 +2,8 @@
 //!
 //! `minima` gathers the lowest returns of every pie slice, `ransac` finds the plane that most
 //! of them lie on, `plane` has the geometry, `surface` follows the heights above and below that
-//! plane outward, `passes` is what is done with all points at once, and this file follows the plane from revolution to revolution and marks the points.
+//! plane outward, `passes` is what is done with all points at once, and this file follows the
+//! plane from revolution to revolution and marks the points.
 
 mod minima;
 mod passes;
@@ -308,9 +309,7 @@ impl Ground {
             for layer in 0..MAX_LAYERS {
                 let point = scan.index(column, layer);
                 let [x, y, _] = scan.point_m(point).map(f64::from);
-                if self.mask[point]
-                    && self.heights_m[point] > BUMPER_M
-                    && outline.distance_m([x, y]) < 0.0
+                if self.mask[point] && self.heights_m[point] > BUMPER_M && outline.contains([x, y])
                 {
                     self.mask[point] = false;
                 }

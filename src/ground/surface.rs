@@ -8,6 +8,7 @@
 
 use std::ops::Range;
 
+use super::minima::slice_of;
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::track::{Outline, Rectangle};
 
@@ -101,11 +102,8 @@ impl Surface {
         };
         self.sector_of.clear();
         let sectors = self.sectors;
-        self.sector_of.extend((0..scan.columns()).map(|column| {
-            let turns = scan.azimuth_rad(column) / std::f64::consts::TAU;
-            let part = turns - libm::floor(turns);
-            ((part * sectors as f64) as usize).min(sectors - 1) as u16
-        }));
+        let of_column = |column| slice_of(scan, column, sectors) as u16;
+        self.sector_of.extend((0..scan.columns()).map(of_column));
         for rings in &mut self.rings {
             *rings = [Ring::default(); MAX_LAYERS];
         }

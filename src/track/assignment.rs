@@ -51,6 +51,11 @@ impl Assigner {
         &self.pairs
     }
 
+    /// The column of each row, as they were paired last.
+    pub(super) fn pairs(&self) -> &[Option<usize>] {
+        &self.pairs
+    }
+
     /// Finds the rows and columns that allowed pairs connect with a row.
     fn connect(&mut self, first: usize, columns: usize, cost: &[f64], forbidden: f64) {
         let is_allowed = |row: usize, column: usize| cost[row * columns + column] < forbidden;

@@ -23,9 +23,8 @@ pub(super) struct ObjectTracker {
     grouping: Grouping,
     outline: Vec<[f64; 2]>,
     cost: Vec<f64>,
+    /// Pairs each track with a group.
     assigner: Assigner,
-    /// The group of each track.
-    pairs: Vec<Option<usize>>,
     /// Where the tracks are.
     known: Vec<Outline>,
     /// The same when the groups are taken in, with their widths and how likely they exist.
@@ -137,15 +136,13 @@ impl ObjectTracker {
             *cost += CLAIM_BONUS;
         }
         let most = GATE + CLAIM_BONUS;
-        let pairs = self.assigner.assign(rows, columns, cost, most);
-        self.pairs.clear();
-        self.pairs.extend_from_slice(pairs);
+        self.assigner.assign(rows, columns, cost, most);
     }
 
     fn update(&mut self, scene: &Scene<'_>, end: Time) {
         let placement = scene.sweep.sensor.placement();
         let sensor_height_m = scene.ground.plane.height_m();
-        for (track, pair) in self.tracks.iter_mut().zip(&self.pairs) {
+        for (track, pair) in self.tracks.iter_mut().zip(self.assigner.pairs()) {
             match pair.map(|number| &self.grouping.groups()[number]) {
                 Some(group) => {
                     let spots = self.grouping.spots(group);
@@ -168,7 +165,7 @@ impl ObjectTracker {
         self.known.clear();
         self.known.extend(outlines);
         for (number, group) in self.grouping.groups().iter().enumerate() {
-            if self.pairs.contains(&Some(number)) || group.claimed_by.is_some() {
+            if self.assigner.pairs().contains(&Some(number)) || group.claimed_by.is_some() {
                 continue;
             }
             let is_piece = self
