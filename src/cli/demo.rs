@@ -9,7 +9,7 @@ use clap::Args;
 
 use super::{Completion, block_on, simulate, stop_signal};
 use crate::config::Configuration;
-use crate::daemon::session::Session;
+use crate::daemon::session::{Datagram, Session};
 use crate::daemon::{self, Options};
 use crate::track::Class;
 use crate::wire::object_list::{Object, ObjectList};
@@ -69,10 +69,11 @@ async fn demonstrate(arguments: &Arguments) -> Result<()> {
 /// Shows every list on a terminal, and one a second in a pipe.
 async fn show_objects(session: Session) -> Result<()> {
     let (mut receiver, _sender) = session.join(&Configuration::default().session)?;
+    let mut datagram = Datagram::default();
     let terminal = std::io::stdout().is_terminal();
     loop {
-        let (datagram, _) = receiver.receive().await?;
-        let Ok((envelope, _)) = Envelope::from_datagram(datagram) else {
+        receiver.receive(&mut datagram).await?;
+        let Ok((envelope, _)) = Envelope::from_datagram(datagram.bytes()) else {
             continue;
         };
         let ours = envelope.data_type == ObjectList::ID && envelope.sender_stamp == SENDER_STAMP;

@@ -9,6 +9,7 @@ use clap::Args;
 use super::files::Output;
 use super::{Completion, SessionArguments, block_on, stop_signal};
 use crate::config::Configuration;
+use crate::daemon::session::Datagram;
 use crate::wire::{Envelope, frame};
 
 #[derive(Debug, Args)]
@@ -32,10 +33,11 @@ async fn record(arguments: &Arguments) -> Result<(u64, u64)> {
     let mut output = Output::create(&arguments.output)?;
     tracing::info!("recording {}; Ctrl-C ends it", receiver.group());
     let mut stop = pin!(stop_signal());
+    let mut datagram = Datagram::default();
     let (mut written, mut damaged, mut lost) = (0, 0, 0);
     loop {
-        let (datagram, arrival) = tokio::select! {
-            received = receiver.receive() => received?,
+        let arrival = tokio::select! {
+            received = receiver.receive(&mut datagram) => received?,
             () = &mut stop => {
                 output.finish()?;
                 return Ok((written, damaged));
@@ -46,6 +48,7 @@ async fn record(arguments: &Arguments) -> Result<(u64, u64)> {
             tracing::warn!("{lost} datagrams lost so far: the receive buffer was full");
         }
         // Only what is sound: one damaged frame would hide what follows from other readers.
+        let datagram = datagram.bytes();
         match (Envelope::from_datagram(datagram), frame::split(datagram, 0)) {
             (Ok(_), Ok((_, end))) => {
                 output.put(&datagram[..end])?;

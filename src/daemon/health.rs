@@ -2,10 +2,10 @@
 //! file system, no port and no shell, and is seen only on this host and in its network
 //! namespace.
 
+use std::cell::Cell;
 use std::io::Read as _;
 use std::os::linux::net::SocketAddrExt as _;
 use std::os::unix::net::{SocketAddr, UnixListener, UnixStream};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use tokio::io::AsyncWriteExt as _;
@@ -21,7 +21,7 @@ const NAME_PREFIX: &str = "kreisel-health-";
 /// What health is judged by.
 #[derive(Debug, Default)]
 pub struct Vitals {
-    state: Mutex<State>,
+    state: Cell<State>,
 }
 
 #[derive(Debug, Default, Clone, Copy)]
@@ -32,27 +32,29 @@ struct State {
 }
 
 impl Vitals {
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Notes that a revolution was answered.
     pub(super) fn answered(&self) {
-        self.state().last_answer = Some(Instant::now());
+        self.state.set(State {
+            last_answer: Some(Instant::now()),
+            ..self.state.get()
+        });
     }
 
     /// Notes how many datagrams and revolutions were dropped so far.
     pub(super) fn dropped(&self, total: u64) {
-        let mut state = self.state();
+        let state = self.state.get();
         if total > state.dropped {
-            state.dropped = total;
-            state.last_drop = Some(Instant::now());
+            self.state.set(State {
+                last_drop: Some(Instant::now()),
+                dropped: total,
+                ..state
+            });
         }
     }
 
     /// `Ok`, or what is wrong.
     pub(super) fn verdict(&self) -> Result<(), String> {
-        let state = *self.state();
+        let state = self.state.get();
         match (state.last_answer, state.last_drop) {
             (None, _) => Err("no revolution was answered yet".into()),
             (Some(last), _) if last.elapsed() > SILENCE => Err(format!(
@@ -70,7 +72,7 @@ impl Vitals {
 }
 
 /// Answers health checks for ever. Without the socket the daemon works all the same.
-pub(super) async fn serve(cid: u8, vitals: Arc<Vitals>) {
+pub(super) async fn serve(cid: u8, vitals: &Vitals) {
     let listener = match listen(cid) {
         Ok(listener) => listener,
         Err(error) => {

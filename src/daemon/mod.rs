@@ -1,12 +1,19 @@
-//! The shell around the pipeline: a session on the network, a queue, a thread, a clock.
+//! The shell around the pipeline: a session on the network, a queue, a clock, one thread.
 //!
-//! `session` has the sockets, `queue` stands between them and `worker`, which owns the
-//! pipeline. `health` answers the container's health check, `latency` and `fault_log` keep
-//! figures and logs small. Everything is bounded.
+//! `session` has the sockets, `intake` sorts what comes, `queue` stands between it and
+//! `worker`, which owns the pipeline. `health` answers the container's health check, `latency`
+//! and `fault_log` keep figures and logs small. Everything is bounded.
+//!
+//! One thread does it all: while the pipeline works, the kernel's buffer takes what comes, and
+//! before the next revolution all of that goes into the queue. So nothing is locked, a
+//! revolution stays where the kernel has written it, and its answer waits for no other thread
+//! to be woken.
 
 mod fault_log;
 
 pub mod health;
+
+mod intake;
 
 mod latency;
 
@@ -16,23 +23,20 @@ pub mod session;
 
 mod worker;
 
-use std::future::Future;
-use std::sync::{Arc, Mutex};
+use std::convert::Infallible;
+use std::future::{Future, ready};
 use std::time::Duration;
 
-use bytes::Bytes;
 use tokio::time::{MissedTickBehavior, interval};
-use tracing::{debug, info, warn};
+use tracing::{info, warn};
 
 use crate::config::Configuration;
 use crate::pipeline::Pipeline;
 use crate::time::Time;
-use crate::wire::Envelope;
-use crate::wire::point_cloud::POINT_CLOUD_ID;
-use fault_log::FaultLog;
 use health::Vitals;
-use queue::{Item, Job, Queue};
-use session::{Arrival, Receiver, Session, SessionError};
+use intake::Intake;
+use queue::Queue;
+use session::{Datagram, Receiver, Session, SessionError};
 use worker::Worker;
 
 /// What a user says on the command line about a daemon.
@@ -49,21 +53,11 @@ pub struct Options {
 /// How often Status is sent.
 const STATUS_PERIOD: Duration = Duration::from_secs(1);
 
-/// The longest pose message of any peer has 250 bytes; what is far longer is none.
-const LONGEST_POSE: usize = 4096;
-
 /// A shorter receive buffer is worth a warning.
 const COMFORTABLE_BUFFER_S: f64 = 2.0;
 
-/// Counters of the receiving side, which Status shows.
-#[derive(Debug, Clone, Default)]
-struct Intake {
-    datagrams: u64,
-    own: u64,
-    damaged: u64,
-    kernel_dropped: u64,
-    faults: crate::tally::Tally,
-}
+/// Datagrams that are taken in before the next one is answered, however many more there are.
+const MOST_AT_ONCE: usize = 256;
 
 /// Runs the daemon until `stop` is ready.
 ///
@@ -86,130 +80,58 @@ pub async fn run(options: Options, stop: impl Future<Output = ()>) -> Result<(),
              CAP_NET_ADMIN, or revolutions are lost when this computer is busy"
         );
     }
-    let vitals = Arc::new(Vitals::default());
-    let health = health::serve(options.session.cid, Arc::clone(&vitals));
-    let queue = Arc::new(Queue::new(parameters.queue_revolutions));
-    let intake = Arc::new(Mutex::new(Intake::default()));
-    let worker = Worker {
-        pipeline: Pipeline::new(&options.configuration, options.sender_stamp),
+    let vitals = Vitals::default();
+    let mut worker = Worker::new(
+        Pipeline::new(&options.configuration, options.sender_stamp),
         sender,
-        sender_stamp: options.sender_stamp,
-        queue: Arc::clone(&queue),
-        intake: Arc::clone(&intake),
-        vitals,
-        receive_buffer: receiver.buffer_bytes(),
-    };
-    let (at_work, gone) = tokio::sync::oneshot::channel::<()>();
-    let worker = std::thread::spawn(move || {
-        // Dropped when the thread ends, by a panic, too.
-        let _at_work = at_work;
-        worker.work();
-    });
+        options.sender_stamp,
+        receiver.buffer_bytes(),
+        &vitals,
+    );
+    let queue = Queue::new(parameters.queue_revolutions);
     let result = tokio::select! {
-        result = receive(&mut receiver, &queue, &intake) => result,
-        () = tick(&queue) => Ok(()),
-        () = health => Ok(()),
-        _ = gone => Err(SessionError::WorkerDied),
+        result = serve(&mut receiver, queue, &mut worker) => result.map(|never| match never {}),
+        () = health::serve(options.session.cid, &vitals) => Ok(()),
         () = stop => Ok(()),
     };
-    queue.close();
-    if worker.join().is_err() {
-        return Err(SessionError::WorkerDied);
-    }
+    worker.log_latency();
     info!("stopped");
     result
 }
 
-/// Asks for a Status once a second.
-async fn tick(queue: &Queue) {
+/// Takes in what comes and answers it, and sends a Status now and then.
+async fn serve(
+    receiver: &mut Receiver,
+    mut queue: Queue,
+    worker: &mut Worker<'_>,
+) -> Result<Infallible, SessionError> {
+    let mut intake = Intake::default();
+    let mut datagram = Datagram::default();
     let mut ticks = interval(STATUS_PERIOD);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
     ticks.tick().await;
     loop {
-        ticks.tick().await;
-        queue.push(Item::Status);
-    }
-}
-
-/// Moves datagrams from the socket into the queue.
-async fn receive(
-    receiver: &mut Receiver,
-    queue: &Queue,
-    intake: &Mutex<Intake>,
-) -> Result<(), SessionError> {
-    let mut log = FaultLog::default();
-    loop {
-        let (datagram, arrival) = receiver.receive().await?;
-        let mut intake = intake
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
-        intake.datagrams += 1;
-        if arrival.kernel_dropped > intake.kernel_dropped {
-            let lost = arrival.kernel_dropped - intake.kernel_dropped;
-            intake.kernel_dropped = arrival.kernel_dropped;
-            log.note("kernel_dropped", || {
-                format!("{lost} datagrams: the receive buffer was full")
-            });
-        }
-        if arrival.is_own {
-            intake.own += 1;
-            continue;
-        }
-        if let Some(item) = sorted(datagram, &arrival, &mut intake, &mut log) {
-            drop(intake);
-            queue.push(item);
-        }
-    }
-}
-
-/// What a datagram means for the queue, if anything.
-fn sorted(
-    datagram: &[u8],
-    arrival: &Arrival,
-    intake: &mut Intake,
-    log: &mut FaultLog,
-) -> Option<Item> {
-    match Envelope::from_datagram(datagram) {
-        Ok((envelope, rest)) => {
-            if rest > 0 {
-                intake.faults.count("trailing_bytes");
-                log.note("trailing_bytes", || {
-                    format!(
-                        "{rest} bytes after the envelope from {} not read",
-                        arrival.source
-                    )
-                });
+        tokio::select! {
+            biased;
+            _ = ticks.tick() => worker.send_status(&intake, &queue),
+            () = ready(()), if !queue.is_empty() => {}
+            arrival = receiver.receive(&mut datagram) => {
+                intake.hear(&mut datagram, &arrival?, &mut queue);
             }
-            if !Pipeline::concerns(envelope.data_type) {
-                debug!(
-                    "message {} from {} passed over",
-                    envelope.data_type, arrival.source
-                );
-                return None;
-            }
-            let is_revolution = envelope.data_type == POINT_CLOUD_ID;
-            if !is_revolution && datagram.len() > LONGEST_POSE {
-                intake.damaged += 1;
-                intake.faults.count("pose_too_long");
-                log.note("pose_too_long", || {
-                    format!("{} bytes from {}", datagram.len(), arrival.source)
-                });
-                return None;
-            }
-            Some(Item::Job(Job {
-                is_revolution,
-                datagram: Bytes::copy_from_slice(datagram),
-                arrival: arrival.time,
-            }))
         }
-        Err(error) => {
-            intake.damaged += 1;
-            intake.faults.count(error.name());
-            log.note(error.name(), || {
-                format!("datagram from {}: {error}", arrival.source)
-            });
-            None
+        for _ in 0..MOST_AT_ONCE {
+            let Some(arrival) = receiver.receive_waiting(&mut datagram)? else {
+                break;
+            };
+            intake.hear(&mut datagram, &arrival, &mut queue);
         }
+        if let Some(job) = queue.pop() {
+            worker.answer(&job);
+            queue.recycle(job);
+        }
+        worker.note_drops(&intake, &queue);
+        // Health checks and signals have their turn even when there is always more to do.
+        tokio::task::yield_now().await;
     }
 }
 

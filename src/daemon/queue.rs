@@ -1,25 +1,15 @@
 //! What stands between the socket and the pipeline: one bounded queue.
 
 use std::collections::VecDeque;
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::mem::replace;
 
-use bytes::Bytes;
-
+use super::session::Datagram;
 use crate::time::Time;
 
-/// Something for the worker to do.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Item {
-    /// Handle an envelope.
-    Job(Job),
-    /// Send a Status.
-    Status,
-}
-
 /// A datagram with a sound envelope.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub(super) struct Job {
-    pub(super) datagram: Bytes,
+    pub(super) datagram: Datagram,
     pub(super) arrival: Time,
     pub(super) is_revolution: bool,
 }
@@ -29,145 +19,143 @@ const MOST_OTHERS: usize = 4096;
 
 /// First in, first out. When a revolution comes and as many wait as may, the oldest of them
 /// goes, because a late answer is of less use than the next one; and it is counted.
+///
+/// Revolutions change hands with their buffers, of which there are one more than may wait.
 #[derive(Debug)]
 pub(super) struct Queue {
     most_revolutions: usize,
-    state: Mutex<State>,
-    changed: Condvar,
-}
-
-#[derive(Debug, Default)]
-struct State {
-    items: VecDeque<Item>,
+    jobs: VecDeque<Job>,
     revolutions: usize,
-    dropped_revolutions: u64,
-    dropped_others: u64,
-    closed: bool,
+    spare: Vec<Datagram>,
+    /// Revolutions that were dropped so far.
+    pub(super) dropped_revolutions: u64,
+    /// Other messages that were dropped so far.
+    pub(super) dropped_others: u64,
 }
 
 impl Queue {
     pub(super) fn new(most_revolutions: usize) -> Self {
         Self {
             most_revolutions,
-            state: Mutex::default(),
-            changed: Condvar::new(),
+            jobs: VecDeque::new(),
+            revolutions: 0,
+            spare: vec![],
+            dropped_revolutions: 0,
+            dropped_others: 0,
         }
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    pub(super) fn is_empty(&self) -> bool {
+        self.jobs.is_empty()
     }
 
-    pub(super) fn push(&self, item: Item) {
-        let mut state = self.state();
-        if is_revolution(&item) {
-            if state.revolutions == self.most_revolutions {
-                state.drop_first(is_revolution);
-                state.dropped_revolutions += 1;
-            }
-            state.revolutions += 1;
-        } else if state.items.len() - state.revolutions >= MOST_OTHERS {
-            state.drop_first(|item| !is_revolution(item));
-            state.dropped_others += 1;
+    /// Takes a revolution over, and leaves an empty datagram in its place.
+    pub(super) fn push_revolution(&mut self, datagram: &mut Datagram, arrival: Time) {
+        if self.revolutions == self.most_revolutions {
+            self.dropped_revolutions += 1;
+            self.drop_first(true);
         }
-        state.items.push_back(item);
-        self.changed.notify_one();
+        let empty = self.spare.pop().unwrap_or_default();
+        self.revolutions += 1;
+        self.jobs.push_back(Job {
+            datagram: replace(datagram, empty),
+            arrival,
+            is_revolution: true,
+        });
     }
 
-    /// Waits for the next item; `None` once the queue is closed, whatever still waits.
-    pub(super) fn pop(&self) -> Option<Item> {
-        let mut state = self.state();
-        loop {
-            if state.closed {
-                return None;
-            }
-            if let Some(item) = state.items.pop_front() {
-                state.revolutions -= usize::from(is_revolution(&item));
-                return Some(item);
-            }
-            state = self
-                .changed
-                .wait(state)
-                .unwrap_or_else(PoisonError::into_inner);
+    /// Takes a copy of another message, which is short where a buffer has room for the longest.
+    pub(super) fn push_other(&mut self, datagram: &Datagram, arrival: Time) {
+        if self.jobs.len() - self.revolutions >= MOST_OTHERS {
+            self.dropped_others += 1;
+            self.drop_first(false);
         }
+        self.jobs.push_back(Job {
+            datagram: datagram.bytes().into(),
+            arrival,
+            is_revolution: false,
+        });
     }
 
-    pub(super) fn close(&self) {
-        self.state().closed = true;
-        self.changed.notify_all();
+    /// The next job, if any.
+    pub(super) fn pop(&mut self) -> Option<Job> {
+        let job = self.jobs.pop_front()?;
+        self.revolutions -= usize::from(job.is_revolution);
+        Some(job)
     }
 
-    /// Revolutions, and other messages, that were dropped so far.
-    pub(super) fn dropped(&self) -> (u64, u64) {
-        let state = self.state();
-        (state.dropped_revolutions, state.dropped_others)
-    }
-}
-
-impl State {
-    fn drop_first(&mut self, unwanted: impl Fn(&Item) -> bool) {
-        if let Some(index) = self.items.iter().position(unwanted)
-            && let Some(item) = self.items.remove(index)
-        {
-            self.revolutions -= usize::from(is_revolution(&item));
+    /// Keeps what a job that is done was received into.
+    pub(super) fn recycle(&mut self, job: Job) {
+        if job.is_revolution {
+            self.spare.push(job.datagram);
         }
     }
-}
 
-fn is_revolution(item: &Item) -> bool {
-    matches!(item, Item::Job(job) if job.is_revolution)
+    fn drop_first(&mut self, is_revolution: bool) {
+        let first = self
+            .jobs
+            .iter()
+            .position(|job| job.is_revolution == is_revolution);
+        if let Some(job) = first.and_then(|index| self.jobs.remove(index)) {
+            self.revolutions -= usize::from(job.is_revolution);
+            self.recycle(job);
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn job(name: &'static str, is_revolution: bool) -> Item {
-        Item::Job(Job {
-            datagram: Bytes::from_static(name.as_bytes()),
-            arrival: Time::ZERO,
-            is_revolution,
-        })
+    fn push(queue: &mut Queue, name: &str) {
+        let mut datagram = Datagram::from(name.as_bytes());
+        match name {
+            "pose" => queue.push_other(&datagram, Time::ZERO),
+            _ => queue.push_revolution(&mut datagram, Time::ZERO),
+        }
+    }
+
+    fn names(queue: &mut Queue) -> Vec<String> {
+        std::iter::from_fn(|| queue.pop())
+            .map(|job| String::from_utf8(job.datagram.bytes().to_vec()).unwrap())
+            .collect()
     }
 
     #[test]
     fn the_oldest_revolution_goes_and_poses_stay() {
-        let queue = Queue::new(2);
-        for item in [
-            job("a", true),
-            job("pose", false),
-            job("b", true),
-            job("c", true),
-        ] {
-            queue.push(item);
+        let mut queue = Queue::new(2);
+        for name in ["a", "pose", "b", "c", "d"] {
+            push(&mut queue, name);
         }
-        assert_eq!(queue.dropped(), (1, 0));
-        assert_eq!(queue.pop(), Some(job("pose", false)));
-        assert_eq!(queue.pop(), Some(job("b", true)));
-        queue.push(job("d", true));
-        assert_eq!(queue.dropped(), (1, 0));
-        assert_eq!(queue.pop(), Some(job("c", true)));
-        assert_eq!(queue.pop(), Some(job("d", true)));
+        assert_eq!((queue.dropped_revolutions, queue.dropped_others), (2, 0));
+        assert_eq!(names(&mut queue), ["pose", "c", "d"]);
+        push(&mut queue, "e");
+        assert_eq!(queue.dropped_revolutions, 2);
+        assert_eq!(names(&mut queue), ["e"]);
     }
 
     #[test]
     fn a_flood_of_other_messages_is_bounded() {
-        let queue = Queue::new(2);
-        queue.push(job("a", true));
+        let mut queue = Queue::new(2);
+        push(&mut queue, "a");
         for _ in 0..MOST_OTHERS + 5 {
-            queue.push(job("pose", false));
+            push(&mut queue, "pose");
         }
-        assert_eq!(queue.dropped(), (0, 5));
-        assert_eq!(queue.pop(), Some(job("a", true)));
+        assert_eq!((queue.dropped_revolutions, queue.dropped_others), (0, 5));
+        assert_eq!(names(&mut queue).len(), 1 + MOST_OTHERS);
     }
 
     #[test]
-    fn a_closed_queue_wakes_who_waits() {
-        let queue = Queue::new(2);
-        std::thread::scope(|scope| {
-            let waiting = scope.spawn(|| queue.pop());
-            queue.close();
-            assert_eq!(waiting.join().unwrap(), None);
-        });
+    fn buffers_come_back() {
+        let mut queue = Queue::new(2);
+        let mut datagram = Datagram::default();
+        for _ in 0..10 {
+            queue.push_revolution(&mut datagram, Time::ZERO);
+        }
+        assert_eq!(queue.spare.len(), 0);
+        while let Some(job) = queue.pop() {
+            queue.recycle(job);
+        }
+        assert_eq!(queue.spare.len(), 2);
     }
 }

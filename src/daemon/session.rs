@@ -1,5 +1,6 @@
 //! A session on the network: UDP multicast 225.0.0.CID, port 12175.
 
+use std::fmt;
 use std::io::{self, IoSliceMut};
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 use std::os::fd::{AsRawFd as _, RawFd};
@@ -38,9 +39,6 @@ pub enum SessionError {
         /// What the system says.
         error: io::Error,
     },
-    /// The thread that owns the pipeline ended by a panic.
-    #[error("the pipeline's thread has died; this is a defect of kreisel")]
-    WorkerDied,
 }
 
 /// The receiving side.
@@ -51,8 +49,14 @@ pub struct Receiver {
     interface: Ipv4Addr,
     own: Option<SocketAddr>,
     buffer_bytes: usize,
-    datagram: Box<[u8]>,
     control: Vec<u8>,
+}
+
+/// A datagram in a buffer of its own, which the kernel writes into.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Datagram {
+    buffer: Box<[u8]>,
+    length: usize,
 }
 
 /// The sending side.
@@ -117,7 +121,6 @@ impl Session {
             interface: interface.unwrap_or(Ipv4Addr::UNSPECIFIED),
             own: sender.socket.local_addr().ok(),
             buffer_bytes,
-            datagram: vec![0; MAX_DATAGRAM_LEN + 1].into_boxed_slice(),
             control: nix::cmsg_space!(nix::sys::time::TimeSpec, u32),
         };
         Ok((receiver, sender))
@@ -205,41 +208,98 @@ impl Receiver {
         0.1 * (self.buffer_bytes / BUFFER_PER_REVOLUTION) as f64
     }
 
-    /// Waits for a datagram.
+    /// Waits for a datagram. Who stops waiting loses none.
     ///
     /// # Errors
     /// [`SessionError::Socket`] when the socket is of no more use.
-    pub async fn receive(&mut self) -> Result<(&[u8], Arrival), SessionError> {
+    pub async fn receive(&mut self, datagram: &mut Datagram) -> Result<Arrival, SessionError> {
         loop {
-            let (datagram, control, own) = (&mut self.datagram, &mut self.control, self.own);
+            let (control, own) = (&mut self.control, self.own);
             let fd = self.socket.as_raw_fd();
-            let received = self
+            let taken = self
                 .socket
                 .async_io(Interest::READABLE, || take(fd, datagram, control, own))
                 .await;
-            match received {
-                // Longer than any datagram of a session can be, or from no IPv4 address.
-                Ok(None) => {}
-                Ok(Some((length, arrival))) => return Ok((&self.datagram[..length], arrival)),
-                Err(error) => {
-                    return Err(SessionError::Socket {
-                        group: self.group,
-                        attempt: "receive",
-                        error,
-                    });
-                }
+            if let Some(arrival) = self.checked(taken)? {
+                return Ok(arrival);
             }
+        }
+    }
+
+    /// The next datagram if it has come already.
+    ///
+    /// # Errors
+    /// As [`Self::receive`].
+    pub fn receive_waiting(
+        &mut self,
+        datagram: &mut Datagram,
+    ) -> Result<Option<Arrival>, SessionError> {
+        loop {
+            let taken = take(
+                self.socket.as_raw_fd(),
+                datagram,
+                &mut self.control,
+                self.own,
+            );
+            if matches!(&taken, Err(error) if error.kind() == io::ErrorKind::WouldBlock) {
+                return Ok(None);
+            }
+            if let Some(arrival) = self.checked(taken)? {
+                return Ok(Some(arrival));
+            }
+        }
+    }
+
+    fn checked(&self, taken: io::Result<Option<Arrival>>) -> Result<Option<Arrival>, SessionError> {
+        taken.map_err(|error| SessionError::Socket {
+            group: self.group,
+            attempt: "receive",
+            error,
+        })
+    }
+}
+
+impl Datagram {
+    /// What was received.
+    pub fn bytes(&self) -> &[u8] {
+        &self.buffer[..self.length]
+    }
+}
+
+impl Default for Datagram {
+    /// Nothing yet, with room for the longest datagram and a byte that tells a longer one.
+    fn default() -> Self {
+        Self {
+            buffer: vec![0; MAX_DATAGRAM_LEN + 1].into(),
+            length: 0,
         }
     }
 }
 
+impl From<&[u8]> for Datagram {
+    /// A copy that takes no more room than it needs.
+    fn from(bytes: &[u8]) -> Self {
+        Self {
+            buffer: bytes.into(),
+            length: bytes.len(),
+        }
+    }
+}
+
+impl fmt::Debug for Datagram {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Datagram of {} bytes", self.length)
+    }
+}
+
+/// `None` is a datagram from no IPv4 address.
 fn take(
     fd: RawFd,
-    datagram: &mut [u8],
+    datagram: &mut Datagram,
     control: &mut [u8],
     own: Option<SocketAddr>,
-) -> io::Result<Option<(usize, Arrival)>> {
-    let mut slices = [IoSliceMut::new(datagram)];
+) -> io::Result<Option<Arrival>> {
+    let mut slices = [IoSliceMut::new(&mut datagram.buffer)];
     let message = recvmsg::<SockaddrIn>(fd, &mut slices, Some(control), MsgFlags::empty())?;
     let Some(source) = message.address else {
         return Ok(None);
@@ -264,7 +324,8 @@ fn take(
     if arrival.time.is_zero() {
         arrival.time = super::now();
     }
-    Ok(Some((message.bytes, arrival)))
+    datagram.length = message.bytes;
+    Ok(Some(arrival))
 }
 
 /// Whether a datagram is ours. A route without a source address makes it 0.0.0.0.

@@ -1,114 +1,115 @@
-//! The thread that owns the pipeline.
+//! Jobs into answers: the pipeline, what its answers are sent with, and what is said of it.
 
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use tracing::{debug, info};
 
 use super::fault_log::FaultLog;
 use super::health::Vitals;
+use super::intake::Intake;
 use super::latency::Latency;
-use super::queue::{Item, Job, Queue};
+use super::now;
+use super::queue::{Job, Queue};
 use super::session::Sender;
-use super::{Intake, now};
 use crate::cloud::Dialect;
 use crate::ground::Origin;
 use crate::pipeline::{Outcome, Pipeline, RevolutionReport};
 use crate::wire::Envelope;
 use crate::wire::envelope::Postmark;
 
-pub(super) struct Worker {
-    pub(super) pipeline: Pipeline,
-    pub(super) sender: Sender,
-    pub(super) sender_stamp: u32,
-    pub(super) queue: Arc<Queue>,
-    pub(super) intake: Arc<Mutex<Intake>>,
-    pub(super) vitals: Arc<Vitals>,
-    pub(super) receive_buffer: usize,
-}
+/// Every so many Status messages the log says what the latency is.
+const LOGGED: u64 = 60;
 
-/// What the worker remembers between items.
-struct Diary {
+/// Owns the pipeline.
+pub(super) struct Worker<'a> {
+    pipeline: Pipeline,
+    sender: Sender,
+    sender_stamp: u32,
+    receive_buffer: usize,
+    vitals: &'a Vitals,
     start: Instant,
-    log: FaultLog,
     latency: Latency,
+    statuses: u64,
     dialect: Option<Dialect>,
     dropped_revolutions: u64,
+    log: FaultLog,
     frame: Vec<u8>,
 }
 
-impl Worker {
-    /// Works until the queue is closed.
-    pub(super) fn work(mut self) {
-        let mut diary = Diary {
+impl<'a> Worker<'a> {
+    /// A worker that sends with `sender_stamp`, of a session with so many bytes of receive
+    /// buffer.
+    pub(super) fn new(
+        pipeline: Pipeline,
+        sender: Sender,
+        sender_stamp: u32,
+        receive_buffer: usize,
+        vitals: &'a Vitals,
+    ) -> Self {
+        Self {
+            pipeline,
+            sender,
+            sender_stamp,
+            receive_buffer,
+            vitals,
             start: Instant::now(),
-            log: FaultLog::default(),
             latency: Latency::default(),
+            statuses: 0,
             dialect: None,
             dropped_revolutions: 0,
+            log: FaultLog::default(),
             frame: vec![],
-        };
-        while let Some(item) = self.queue.pop() {
-            match item {
-                Item::Job(job) => self.answer(&job, &mut diary),
-                Item::Status => self.send_status(&mut diary),
-            }
         }
     }
 
-    fn answer(&mut self, job: &Job, diary: &mut Diary) {
+    /// Handles a message, and sends what answers it.
+    pub(super) fn answer(&mut self, job: &Job) {
         let begin = Instant::now();
-        // The receiving side has decoded it once already.
-        let Ok((envelope, _)) = Envelope::from_datagram(&job.datagram) else {
+        // The intake has decoded it once already.
+        let Ok((envelope, _)) = Envelope::from_datagram(job.datagram.bytes()) else {
             return;
         };
         match self.pipeline.handle(&envelope) {
             Ok(Outcome::Revolution(report)) => {
-                for frame in self.pipeline.publish(now(), begin.elapsed().as_secs_f32()) {
+                let processing_s = begin.elapsed().as_secs_f32();
+                for frame in self.pipeline.publish(now(), processing_s) {
                     if let Err(error) = self.sender.send(frame) {
-                        diary.log.note("send", || error.to_string());
+                        self.log.note("send", || error.to_string());
                     }
                 }
-                diary.latency.record(now() - job.arrival);
+                self.latency.record(now() - job.arrival);
                 self.vitals.answered();
-                diary.tell(&report);
+                self.tell(&report);
             }
             Ok(_) => {}
-            Err(fault) => diary.log.note(fault.name(), || fault.to_string()),
+            Err(fault) => self.log.note(fault.name(), || fault.to_string()),
         }
-        self.note_drops(diary);
     }
 
-    fn note_drops(&self, diary: &mut Diary) {
-        let (revolutions, others) = self.queue.dropped();
-        if revolutions > diary.dropped_revolutions {
-            diary.dropped_revolutions = revolutions;
-            diary.log.note("queue_dropped", || {
+    /// Notes what could not be answered.
+    pub(super) fn note_drops(&mut self, intake: &Intake, queue: &Queue) {
+        let revolutions = queue.dropped_revolutions;
+        if revolutions > self.dropped_revolutions {
+            self.dropped_revolutions = revolutions;
+            self.log.note("queue_dropped", || {
                 format!("{revolutions} revolutions so far: the pipeline is behind")
             });
         }
-        let intake = self.intake.lock().unwrap_or_else(PoisonError::into_inner);
         self.vitals
-            .dropped(revolutions + others + intake.kernel_dropped);
+            .dropped(revolutions + queue.dropped_others + intake.kernel_dropped);
     }
 
-    fn send_status(&mut self, diary: &mut Diary) {
-        self.note_drops(diary);
+    /// Sends a Status.
+    pub(super) fn send_status(&mut self, intake: &Intake, queue: &Queue) {
         let mut status = self.pipeline.status();
-        let intake = self
-            .intake
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clone();
         let mut faults = self.pipeline.counts().faults.clone();
         faults.add(&intake.faults);
-        let (dropped_revolutions, dropped_others) = self.queue.dropped();
-        faults.count_many("queue_dropped_poses", dropped_others);
-        let latency = diary.latency.percentiles();
-        status.uptime = diary.start.elapsed().as_secs_f64();
+        faults.count_many("queue_dropped_poses", queue.dropped_others);
+        let latency = self.latency.percentiles();
+        status.uptime = self.start.elapsed().as_secs_f64();
         // Those that waited in vain were received, too.
-        status.revolutions_received += dropped_revolutions;
-        status.revolutions_queue_dropped = dropped_revolutions;
+        status.revolutions_received += queue.dropped_revolutions;
+        status.revolutions_queue_dropped = queue.dropped_revolutions;
         status.datagrams_received = intake.datagrams;
         status.datagrams_own = intake.own;
         status.datagrams_kernel_dropped = intake.kernel_dropped;
@@ -116,6 +117,7 @@ impl Worker {
         status.faults = faults.to_string();
         status.latency_median = latency.median_s;
         status.latency_p99 = latency.p99_s;
+        status.latency_p999 = latency.p999_s;
         status.latency_max = latency.max_s;
         status.receive_buffer = self.receive_buffer as u32;
         status.healthy = self.vitals.verdict().is_ok();
@@ -125,16 +127,24 @@ impl Worker {
             sampled: sent,
             sender_stamp: self.sender_stamp,
         };
-        diary.frame.clear();
-        postmark.put(&mut diary.frame, &status);
-        if let Err(error) = self.sender.send(&diary.frame) {
-            diary.log.note("send", || error.to_string());
+        self.frame.clear();
+        postmark.put(&mut self.frame, &status);
+        if let Err(error) = self.sender.send(&self.frame) {
+            self.log.note("send", || error.to_string());
         }
         debug!("{status:?}");
+        self.statuses += 1;
+        if self.statuses.is_multiple_of(LOGGED) {
+            self.log_latency();
+        }
     }
-}
 
-impl Diary {
+    /// Says how long answers took.
+    pub(super) fn log_latency(&self) {
+        let (revolutions, latency) = (self.latency.revolutions(), self.latency.percentiles());
+        info!("{revolutions} revolutions answered; from arrival to answer {latency}");
+    }
+
     /// Says what changed.
     fn tell(&mut self, report: &RevolutionReport) {
         let Dialect {

@@ -25,11 +25,11 @@ super::message! {
         10 => poses_received: u64,
         /// Every fault with its count, as `name=count` with spaces between.
         11 => faults: String,
-        /// Arrival of a point cloud to its list sent, median, seconds.
+        /// Arrival of a point cloud to its list sent, median of the latest 6,000 to 12,000, seconds.
         12 => latency_median: f32,
         /// The same, 99th percentile.
         13 => latency_p99: f32,
-        /// The same, greatest.
+        /// The same, greatest since start.
         14 => latency_max: f32,
         /// Sensor that was found.
         15 => sensor: String,
@@ -63,5 +63,7 @@ super::message! {
         29 => profile: String,
         /// Version of the program.
         30 => version: String,
+        /// The same as `latency_p99`, 99.9th percentile.
+        31 => latency_p999: f32,
     }
 }
