@@ -2,7 +2,7 @@
 
 use super::joining::{Joiner, Points};
 use super::row::{self, Centre, Row};
-use super::window::Windows;
+use super::window::{Cone, Windows};
 use super::{ClusterParameters, Clusters};
 use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, Scan};
 use crate::marks::marked;
@@ -116,16 +116,16 @@ impl Dbscan {
     /// The layers that can hold neighbours of a point, with their reach: its own first, then
     /// those below and those above until one is too far. The farther a layer, the less it
     /// reaches.
-    fn layers(&self, centre: &Centre) -> impl Iterator<Item = (usize, usize)> {
-        let within = |layer: usize| {
-            let reach = self
-                .windows
-                .reach(centre.layer, layer, centre.range_m, centre.eps_m);
+    fn layers(&self, centre: &Centre) -> impl Iterator<Item = (usize, usize)> + use<'_> {
+        let cone = Cone::around(centre.range_m, centre.eps_m);
+        let own = centre.layer;
+        let within = move |layer: usize| {
+            let reach = self.windows.reach(own, layer, cone);
             reach.map(|reach| (layer, reach))
         };
-        let below = (0..centre.layer).rev().map_while(within);
-        let above = (centre.layer + 1..MAX_LAYERS).map_while(within);
-        within(centre.layer).into_iter().chain(below).chain(above)
+        let below = (0..own).rev().map_while(within);
+        let above = (own + 1..MAX_LAYERS).map_while(within);
+        within(own).into_iter().chain(below).chain(above)
     }
 
     /// Numbers clusters by their first core point.

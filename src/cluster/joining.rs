@@ -4,7 +4,7 @@ use super::ClusterParameters;
 use super::partition::Partition;
 use super::row::{self, Row};
 use super::runs::{Run, Runs};
-use super::window::Windows;
+use super::window::{Cone, Windows};
 use crate::cloud::{MAX_COLUMNS, MAX_LAYERS};
 use crate::marks::marked;
 
@@ -94,10 +94,10 @@ fn join_run(
     points: Points<'_>,
 ) {
     let eps_near_m = points.parameters.eps_m(run.low_m);
+    let cone = Cone::around(run.low_m, eps_near_m);
     let eps_far_m = points.parameters.eps_m(run.high_m);
     for other in layer..MAX_LAYERS {
-        let reach = points.windows.reach(layer, other, run.low_m, eps_near_m);
-        let Some(reach) = reach else {
+        let Some(reach) = points.windows.reach(layer, other, cone) else {
             break;
         };
         let stretches = points.windows.around(&run.columns, reach);

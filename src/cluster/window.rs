@@ -11,16 +11,52 @@ pub(super) struct Windows {
     setting: WindowSetting,
     fixed_columns: usize,
     columns: usize,
-    step_rad: f32,
+    /// Columns that a chord of the length 1, in radii, may span.
+    columns_per_chord: f32,
     /// Columns by which the end of the sweep overlaps its beginning.
     overlap: usize,
-    sine: [f32; MAX_LAYERS],
-    cosine: [f32; MAX_LAYERS],
+    /// Of each pair of layers.
+    pairs: [[Pair; MAX_LAYERS]; MAX_LAYERS],
+}
+
+/// The square of the chord that the azimuth difference of two rays spans is `most` less `slope`
+/// times the cosine of the angle between them.
+#[derive(Debug, Clone, Copy, Default)]
+struct Pair {
+    most: f32,
+    slope: f32,
+}
+
+/// The rays on which neighbours of a point can be.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cone {
+    /// Of the angle to the point's own ray.
+    least_cosine: f32,
+}
+
+impl Cone {
+    /// Around the ray of a point at `range_m`, of which neighbours are within `eps_m`.
+    ///
+    /// A return on a ray is at least r sin(g) away, g being the angle between the rays, so
+    /// only rays with cos(g) >= sqrt(1 - (eps / r)^2) count.
+    #[inline]
+    pub(super) fn around(range_m: f32, eps_m: f32) -> Self {
+        let ratio = eps_m / range_m;
+        Self {
+            least_cosine: if ratio < 1.0 {
+                (1.0 - ratio * ratio).sqrt()
+            } else {
+                -1.0
+            },
+        }
+    }
 }
 
 /// A chord of this length, in radii, spans an arc of pi / 3; shorter ones are closer to theirs.
 const LONGEST_CHORD: f32 = 1.0;
-const ARC_PER_CHORD: f32 = std::f32::consts::FRAC_PI_3;
+const ARC_PER_CHORD: f64 = std::f64::consts::FRAC_PI_3;
+/// Rounding must not lose a neighbour that is exactly eps away.
+const SLACK: f64 = 1e-6;
 
 impl Windows {
     pub(super) fn new(parameters: &ClusterParameters) -> Self {
@@ -28,59 +64,53 @@ impl Windows {
             setting: parameters.window,
             fixed_columns: parameters.window_columns,
             columns: 0,
-            step_rad: 0.0,
+            columns_per_chord: 0.0,
             overlap: 0,
-            sine: [0.0; MAX_LAYERS],
-            cosine: [0.0; MAX_LAYERS],
+            pairs: Default::default(),
         }
     }
 
     /// Takes over the geometry of a revolution.
     pub(super) fn prepare(&mut self, scan: &Scan) {
         self.columns = scan.columns();
-        self.step_rad = libm::fabs(scan.step_rad()) as f32;
+        self.columns_per_chord = (ARC_PER_CHORD / libm::fabs(scan.step_rad())) as f32;
         let turn_rad = scan.columns() as f64 * libm::fabs(scan.step_rad());
         let over_rad = (turn_rad - std::f64::consts::TAU).max(0.0);
         self.overlap = libm::ceil(over_rad / libm::fabs(scan.step_rad()).max(1e-9)) as usize;
-        for (layer, degrees) in scan.sensor().elevation_deg.iter().enumerate() {
-            let (sine, cosine) = libm::sincos(degrees.to_radians());
-            (self.sine[layer], self.cosine[layer]) = (sine as f32, cosine as f32);
+        let mut rays = [(0.0, 1.0); MAX_LAYERS];
+        for (ray, elevation_deg) in rays.iter_mut().zip(scan.sensor().elevation_deg) {
+            *ray = libm::sincos(elevation_deg.to_radians());
+        }
+        for (pairs, (sine, cosine)) in self.pairs.iter_mut().zip(rays) {
+            for (pair, (other_sine, other_cosine)) in pairs.iter_mut().zip(rays) {
+                let flat = cosine * other_cosine;
+                *pair = Pair {
+                    most: (2.0 + 2.0 * sine * other_sine / flat + SLACK) as f32,
+                    slope: (2.0 / flat) as f32,
+                };
+            }
         }
     }
 
-    /// How many columns to either side of a point at `range_m` in `layer` can hold a return of
-    /// `other` within `eps_m`; `None` if none can, however far.
+    /// How many columns to either side of a point in `layer` can hold a neighbour of it in
+    /// `other`; `None` if none can, however far.
     ///
-    /// A return on a ray is at least r sin(g) away, g being the angle between the rays, so
-    /// only rays with cos(g) >= sqrt(1 - (eps / r)^2) count; and cos(g) = sin v sin w +
-    /// cos v cos w cos(d) for elevations v, w and an azimuth difference d.
-    pub(super) fn reach(
-        &self,
-        layer: usize,
-        other: usize,
-        range_m: f32,
-        eps_m: f32,
-    ) -> Option<usize> {
+    /// cos(g) = sin v sin w + cos v cos w cos(d) for elevations v, w and an azimuth difference
+    /// d, which spans a chord of the square 2 (1 - cos d).
+    #[inline]
+    pub(super) fn reach(&self, layer: usize, other: usize, cone: Cone) -> Option<usize> {
         if self.setting == WindowSetting::Columns {
             return Some(self.fixed_columns.min(self.columns / 2));
         }
-        let ratio = eps_m / range_m;
-        if ratio >= 1.0 {
-            return Some(self.columns / 2);
-        }
-        let least_cosine = (1.0 - ratio * ratio).sqrt();
-        let cosine_d = (least_cosine - self.sine[layer] * self.sine[other])
-            / (self.cosine[layer] * self.cosine[other]);
-        // Rounding must not lose a neighbour that is exactly eps away.
-        let chord_squared = 2.0 * (1.0 - cosine_d) + 1e-6;
+        let Pair { most, slope } = self.pairs[layer][other];
+        let chord_squared = most - slope * cone.least_cosine;
         if chord_squared < 0.0 {
             return None;
         }
         if chord_squared > LONGEST_CHORD * LONGEST_CHORD {
             return Some(self.columns / 2);
         }
-        let arc_rad = ARC_PER_CHORD * chord_squared.sqrt();
-        let reach = (arc_rad / self.step_rad) as usize + 1 + self.overlap;
+        let reach = (chord_squared.sqrt() * self.columns_per_chord) as usize + 1 + self.overlap;
         Some(reach.min(self.columns / 2))
     }
 
@@ -140,19 +170,20 @@ mod tests {
     #[test]
     fn the_reach_shrinks_with_range_and_with_the_distance_of_layers() {
         let windows = windows(1800, Profile::Default);
-        let own = windows.reach(8, 8, 10.0, 0.5).unwrap();
+        let reach = |other, range_m| windows.reach(8, other, Cone::around(range_m, 0.5));
+        let own = reach(8, 10.0).unwrap();
         assert!((15..=18).contains(&own), "{own}");
-        assert!(windows.reach(8, 9, 10.0, 0.5).unwrap() < own);
-        assert_eq!(windows.reach(8, 10, 10.0, 0.5), None);
-        assert!(windows.reach(8, 8, 40.0, 0.5).unwrap() <= 6);
-        assert_eq!(windows.reach(8, 0, 0.4, 0.5), Some(900));
+        assert!(reach(9, 10.0).unwrap() < own);
+        assert_eq!(reach(10, 10.0), None);
+        assert!(reach(8, 40.0).unwrap() <= 6);
+        assert_eq!(reach(0, 0.4), Some(900));
     }
 
     #[test]
     fn the_thesis_looks_at_eighty_candidates() {
         let windows = windows(1800, Profile::Thesis);
         let reaches: Vec<_> = (0..16)
-            .map(|other| windows.reach(3, other, 20.0, 1.8))
+            .map(|other| windows.reach(3, other, Cone::around(20.0, 1.8)))
             .collect();
         assert_eq!(reaches, [Some(2); 16]);
         assert_eq!(windows.stretches(100, 2, 2)[0].len() * 16, 80);

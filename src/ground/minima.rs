@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::{Plane, passes};
 use crate::cloud::{CAPACITY, MAX_LAYERS, Scan};
+use crate::float::least_of;
 
 /// The lowest returns, slice by slice. The buffers are made once.
 #[derive(Debug, Clone)]
@@ -43,6 +44,12 @@ impl Minima {
         for (column, heights_m) in heights_m.iter().enumerate() {
             let slice = slice_of(scan, column, self.segments.len());
             let segment = &mut self.segments[slice];
+            let highest_m = segment
+                .get(self.per_segment - 1)
+                .map_or(f32::INFINITY, |highest| highest.above_m);
+            if least_of(*heights_m) >= highest_m {
+                continue;
+            }
             for (layer, above_m) in heights_m.iter().copied().enumerate() {
                 if above_m < f32::INFINITY {
                     let point = scan.index(column, layer) as u32;

@@ -21,7 +21,7 @@ use crate::parameter::{choices, parameters};
 use crate::random::Random;
 use crate::track::Rectangle;
 use minima::Minima;
-use passes::Band;
+use passes::{Band, Cloud};
 use surface::Surface;
 
 choices! {
@@ -136,8 +136,8 @@ pub struct Ground {
     revolutions: u64,
     minima: Minima,
     /// Returns that the plane is refined with.
-    near: Vec<Vector3<f64>>,
-    /// Those of them, or of the lowest returns, that lie close to a candidate plane.
+    near: Cloud,
+    /// The lowest returns that lie close to a candidate plane.
     support: Vec<Vector3<f64>>,
     mask: Vec<bool>,
     surface: Surface,
@@ -167,8 +167,8 @@ impl Ground {
             misses: 0,
             revolutions: 0,
             minima: Minima::new(parameters.segments, parameters.lowest_per_segment),
-            near: Vec::with_capacity(CAPACITY),
-            support: Vec::with_capacity(CAPACITY),
+            near: Cloud::default(),
+            support: vec![],
             mask: Vec::with_capacity(CAPACITY),
             surface: Surface::new(SECTORS),
             heights_m: Vec::with_capacity(CAPACITY),
@@ -243,25 +243,28 @@ impl Ground {
         let near_m = self.parameters.inlier_distance_m;
         self.gather_near(scan, &plane, WIDER * near_m);
         (0..self.parameters.refinements).fold(plane, |plane, _| {
-            let points = self.near.iter().copied();
-            let close = points.filter(|point| libm::fabs(plane.above_m(point)) <= near_m);
-            self.support.clear();
-            self.support.extend(close);
-            Plane::fit(self.support.iter().copied()).unwrap_or(plane)
+            let moments = passes::moments_near(&self.near, &plane, near_m);
+            moments.plane().unwrap_or(plane)
         })
     }
 
     /// Notes the returns within a distance of the plane and within the candidates' range.
     fn gather_near(&mut self, scan: &Scan, plane: &Plane, near_m: f64) {
-        self.near.clear();
+        let Cloud { x_m, y_m, z_m } = &mut self.near;
+        for coordinates in [&mut *x_m, y_m, z_m] {
+            coordinates.clear();
+        }
         if self.parameters.refinements == 0 {
             return;
         }
         let far_squared = (self.parameters.candidate_range_m.powi(2)) as f32;
         self.marks.resize(scan.len(), false);
         passes::mark_near(scan, plane, near_m as f32, far_squared, &mut self.marks);
-        let points = marked(&self.marks).map(|point| Vector3::from(scan.point_m(point)));
-        self.near.extend(points.map(|point| point.map(f64::from)));
+        for point in marked(&self.marks) {
+            x_m.push(scan.x_m()[point]);
+            y_m.push(scan.y_m()[point]);
+            z_m.push(scan.z_m()[point]);
+        }
     }
 
     fn mark(&mut self, scan: &Scan, plane: &Plane, vehicles: &[Rectangle]) -> usize {

@@ -3,6 +3,7 @@
 use multiversion::multiversion;
 
 use super::Plane;
+use super::plane::Moments;
 use super::surface::Profile;
 use crate::cloud::{MAX_LAYERS, Scan};
 
@@ -137,6 +138,69 @@ pub(super) fn mark_near(
             & (x * x + y * y <= far_squared)
             & (ranges_m[point] > 0.0);
     }
+}
+
+/// Points by their coordinates.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Cloud {
+    pub(super) x_m: Vec<f32>,
+    pub(super) y_m: Vec<f32>,
+    pub(super) z_m: Vec<f32>,
+}
+
+/// The moments of the points within `near_m` of a plane.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub(super) fn moments_near(cloud: &Cloud, plane: &Plane, near_m: f64) -> Moments {
+    let [a, b, c] = plane.normal();
+    let height_m = plane.height_m();
+    let mut moments = Moments::default();
+    let total = cloud.x_m.len();
+    let [mut is_near, mut x, mut y, mut z] = [[0.0; TOGETHER]; 4];
+    let mut begin = 0;
+    while begin < total {
+        let end = (begin + TOGETHER).min(total);
+        let (x_m, y_m) = (&cloud.x_m[begin..end], &cloud.y_m[begin..end]);
+        let z_m = &cloud.z_m[begin..end];
+        for point in 0..end - begin {
+            let (x_m, y_m) = (f64::from(x_m[point]), f64::from(y_m[point]));
+            let z_m = f64::from(z_m[point]);
+            let above_m = a * x_m + b * y_m + c * z_m + height_m;
+            let weight = if above_m.abs() <= near_m { 1.0 } else { 0.0 };
+            is_near[point] = weight;
+            x[point] = weight * x_m;
+            y[point] = weight * y_m;
+            z[point] = weight * z_m;
+        }
+        // What is not near, or not there, adds nothing.
+        for coordinates in [&mut is_near, &mut x, &mut y, &mut z] {
+            coordinates[end - begin..].fill(0.0);
+        }
+        moments.weight += dot(&is_near, &is_near);
+        moments.x += dot(&is_near, &x);
+        moments.y += dot(&is_near, &y);
+        moments.z += dot(&is_near, &z);
+        moments.xx += dot(&x, &x);
+        moments.xy += dot(&x, &y);
+        moments.yy += dot(&y, &y);
+        moments.xz += dot(&x, &z);
+        moments.yz += dot(&y, &z);
+        begin = end;
+    }
+    moments
+}
+
+/// The sum of the products of numbers.
+#[inline(always)]
+fn dot(a: &[f64; TOGETHER], b: &[f64; TOGETHER]) -> f64 {
+    const LANES: usize = 8;
+    let mut sums = [0.0; LANES];
+    let (a, b) = (a.as_chunks::<LANES>().0, b.as_chunks::<LANES>().0);
+    for eight in 0..a.len() {
+        for lane in 0..LANES {
+            sums[lane] += a[eight][lane] * b[eight][lane];
+        }
+    }
+    sums.iter().sum()
 }
 
 /// Marks the ground returns that are higher than `least_m`, and `per_m` for each metre of

@@ -41,34 +41,21 @@ impl Plane {
         })
     }
 
-    /// Least squares along z (thesis section 4.1.1, "Plane-fitting"): points relative to their
-    /// mean, so that d vanishes and a 2 x 2 system is left, solved by Cramer's rule; then the
-    /// Hesse form from n = (a, b, 1) and the mean. `None` without points.
-    pub fn fit(points: impl Iterator<Item = Vector3<f64>> + Clone) -> Option<Self> {
-        let nothing = (0usize, Vector3::zeros());
-        let (count, sum) = points
-            .clone()
-            .fold(nothing, |(count, sum), point| (count + 1, sum + point));
-        if count == 0 {
-            return None;
-        }
-        let mean = sum / count as f64;
-        let [mut xx, mut xy, mut yy, mut xz, mut yz] = [0.0; 5];
+    /// The plane of least squares along z through points. `None` without points.
+    pub fn fit(points: impl Iterator<Item = Vector3<f64>>) -> Option<Self> {
+        let mut moments = Moments::default();
         for point in points {
-            let p = point - mean;
-            xx += p.x * p.x;
-            xy += p.x * p.y;
-            yy += p.y * p.y;
-            xz += p.x * p.z;
-            yz += p.y * p.z;
+            moments.weight += 1.0;
+            moments.x += point.x;
+            moments.y += point.y;
+            moments.z += point.z;
+            moments.xx += point.x * point.x;
+            moments.xy += point.x * point.y;
+            moments.yy += point.y * point.y;
+            moments.xz += point.x * point.z;
+            moments.yz += point.y * point.z;
         }
-        let determinant = match xx * yy - xy * xy {
-            0.0 => SMALL_DETERMINANT,
-            determinant => determinant,
-        };
-        let a = (yz * xy - xz * yy) / determinant;
-        let b = (xy * xz - xx * yz) / determinant;
-        Self::with_normal(Vector3::new(a, b, 1.0), mean)
+        moments.plane()
     }
 
     /// Height of a point above the plane; negative below it.
@@ -101,6 +88,44 @@ impl Plane {
     /// Angle between two planes.
     pub fn angle_to_rad(&self, other: &Self) -> f64 {
         libm::acos(self.normal.dot(&other.normal).min(1.0))
+    }
+}
+
+/// Sums over points, each with a weight, from which the plane follows that fits them best.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Moments {
+    pub(super) weight: f64,
+    pub(super) x: f64,
+    pub(super) y: f64,
+    pub(super) z: f64,
+    pub(super) xx: f64,
+    pub(super) xy: f64,
+    pub(super) yy: f64,
+    pub(super) xz: f64,
+    pub(super) yz: f64,
+}
+
+impl Moments {
+    /// Least squares along z (thesis section 4.1.1, "Plane-fitting"): points relative to their
+    /// mean, so that d vanishes and a 2 x 2 system is left, solved by Cramer's rule; then the
+    /// Hesse form from n = (a, b, 1) and the mean. `None` without points.
+    pub(super) fn plane(&self) -> Option<Plane> {
+        if self.weight <= 0.0 {
+            return None;
+        }
+        let mean = Vector3::new(self.x, self.y, self.z) / self.weight;
+        let xx = self.xx - mean.x * self.x;
+        let xy = self.xy - mean.x * self.y;
+        let yy = self.yy - mean.y * self.y;
+        let xz = self.xz - mean.x * self.z;
+        let yz = self.yz - mean.y * self.z;
+        let determinant = match xx * yy - xy * xy {
+            0.0 => SMALL_DETERMINANT,
+            determinant => determinant,
+        };
+        let a = (yz * xy - xz * yy) / determinant;
+        let b = (xy * xz - xx * yz) / determinant;
+        Plane::with_normal(Vector3::new(a, b, 1.0), mean)
     }
 }
 

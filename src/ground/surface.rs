@@ -8,6 +8,8 @@
 
 use std::ops::Range;
 
+use multiversion::multiversion;
+
 use super::minima::slice_of;
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::track::{Outline, Rectangle};
@@ -178,21 +180,18 @@ impl Surface {
             levels.clear();
         }
         for column in columns {
-            let (ranges_m, heights_m) = (&ranges_m[column], &heights_m[column]);
-            let distances_m = &distances_m[column];
-            // Of the next return above; above the highest nothing rises.
-            let (mut upper_m, mut upper_distance_m) = (f32::NEG_INFINITY, 0.0);
-            for layer in (0..MAX_LAYERS).rev() {
-                if ranges_m[layer] <= 0.0 {
-                    continue;
-                }
+            let (heights_m, distances_m) = (&heights_m[column], &distances_m[column]);
+            let (returns, mut low) = low_returns(&ranges_m[column], heights_m, distances_m);
+            while low != 0 {
+                let layer = low.trailing_zeros() as usize;
+                low &= low - 1;
                 let (level_m, distance_m) = (heights_m[layer], distances_m[layer]);
-                let rises_steeply = upper_m - level_m > STEEP * (upper_distance_m - distance_m);
-                (upper_m, upper_distance_m) = (level_m, distance_m);
-                let can_be_ground = !rises_steeply
-                    & (distance_m < FARTHEST_M)
-                    & (level_m < HIGHEST_M + STEEPEST * distance_m);
-                if can_be_ground && !self.is_taken(scan, scan.index(column, layer)) {
+                // Above the highest return nothing rises.
+                let above = returns >> layer >> 1;
+                let upper = layer + 1 + above.trailing_zeros() as usize;
+                let rises_steeply = above != 0
+                    && heights_m[upper] - level_m > STEEP * (distances_m[upper] - distance_m);
+                if !rises_steeply && !self.is_taken(scan, scan.index(column, layer)) {
                     self.levels[layer].push((level_m, distance_m));
                 }
             }
@@ -216,6 +215,9 @@ impl Surface {
 
     /// Whether a vehicle of the sector stands there.
     fn is_taken(&self, scan: &Scan, point: usize) -> bool {
+        if self.vehicles.is_empty() {
+            return false;
+        }
         let [x, y, _] = scan.point_m(point).map(f64::from);
         self.vehicles.iter().any(|vehicle| {
             let distance_m = vehicle.distance_within_m([x, y], AROUND_VEHICLES_M);
@@ -350,6 +352,25 @@ impl Profile {
         };
         self.count += 1;
     }
+}
+
+/// The layers of a column that have a return, and those whose return is near and low enough to
+/// be the ground, a bit for each.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn low_returns(
+    ranges_m: &[f32; MAX_LAYERS],
+    heights_m: &[f32; MAX_LAYERS],
+    distances_m: &[f32; MAX_LAYERS],
+) -> (u32, u32) {
+    let (mut returns, mut low) = (0, 0);
+    for layer in 0..MAX_LAYERS {
+        let is_return = ranges_m[layer] > 0.0;
+        let is_low = (distances_m[layer] < FARTHEST_M)
+            & (heights_m[layer] < HIGHEST_M + STEEPEST * distances_m[layer]);
+        returns |= u32::from(is_return) << layer;
+        low |= u32::from(is_return & is_low) << layer;
+    }
+    (returns, low)
 }
 
 /// Keeps the rings that can be one ground, from the inside out, and forgets the others.

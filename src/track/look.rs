@@ -73,13 +73,15 @@ impl Look {
         let (mut age_s, mut floor_m, mut top_m) = (0.0, f64::MAX, f64::MIN);
         let mut top_point = 0;
         for spot in spots {
-            middle_m += spot.at_m / count;
-            age_s += spot.age_s / count;
+            middle_m += spot.at_m;
+            age_s += spot.age_s;
             floor_m = floor_m.min(spot.above_m);
             if spot.above_m > top_m {
                 (top_m, top_point) = (spot.above_m, spot.point as usize);
             }
         }
+        middle_m /= count;
+        age_s /= count;
         let range_m = (middle_m - sensor_m).norm();
         let layer = scan.layer(top_point);
         let top_below_m = if layer + 1 < MAX_LAYERS && !is_covered(scan, top_point) {
@@ -88,7 +90,7 @@ impl Look {
             f64::MAX
         };
         let low = spots.iter().filter(|spot| spot.above_m <= BELT_M).count();
-        let ends = ends(spots, sensor_m, middle_m);
+        let ends = ends(spots, sensor_m);
         Self {
             middle_m,
             age_s,
@@ -287,20 +289,17 @@ fn goes_on(spots: &[Spot], scan: &Scan) -> f64 {
     f64::from(on) / f64::from(columns.max(1))
 }
 
-/// The leftmost and the rightmost of a group, seen from the sensor.
-fn ends(spots: &[Spot], sensor_m: Vector2<f64>, middle_m: Vector2<f64>) -> [Option<&Spot>; 2] {
-    let sight = middle_m - sensor_m;
-    let left = Vector2::new(-sight.y, sight.x);
-    let aside = |spot: &Spot| left.dot(&(spot.at_m - sensor_m)) / (spot.at_m - sensor_m).norm();
-    let mut ends = [None; 2];
-    let (mut leftmost, mut rightmost) = (f64::NEG_INFINITY, f64::INFINITY);
+/// The leftmost and the rightmost of a group, seen from the sensor, which it does not surround.
+fn ends(spots: &[Spot], sensor_m: Vector2<f64>) -> [Option<&Spot>; 2] {
+    let mut ends = [spots.first(); 2];
+    let mut rays_m = ends.map(|end| end.map_or(sensor_m, |end| end.at_m) - sensor_m);
     for spot in spots {
-        let aside = aside(spot);
-        if aside >= leftmost {
-            (leftmost, ends[0]) = (aside, Some(spot));
+        let ray_m = spot.at_m - sensor_m;
+        if rays_m[0].perp(&ray_m) >= 0.0 {
+            (rays_m[0], ends[0]) = (ray_m, Some(spot));
         }
-        if aside < rightmost {
-            (rightmost, ends[1]) = (aside, Some(spot));
+        if rays_m[1].perp(&ray_m) < 0.0 {
+            (rays_m[1], ends[1]) = (ray_m, Some(spot));
         }
     }
     ends

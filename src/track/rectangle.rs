@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use multiversion::multiversion;
 
-use crate::float::{greatest, least};
+use crate::float::{greatest, greatest_of, least, least_of};
 
 /// A rectangle in the plane, seen from a sensor at the origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,7 +25,7 @@ const DIRECTIONS: usize = 30;
 /// Points that are looked at for the direction: more do not change it.
 const MOST_POINTS: usize = 96;
 /// Distance to an edge below which a point counts as on it.
-const NEAREST_M: f64 = 0.05;
+const NEAREST_M: f32 = 0.05;
 
 impl Rectangle {
     /// The rectangle around points with its length along `heading_rad`, or, without one, in
@@ -140,43 +140,41 @@ impl Outline {
     }
 }
 
-/// Some of many points, by coordinates.
+/// Some of many points, by coordinates relative to the first one.
 struct Sample {
-    count: usize,
-    x_m: [f64; MOST_POINTS],
-    y_m: [f64; MOST_POINTS],
+    /// Vectors of them that hold any.
+    vectors: usize,
+    x_m: [f32; MOST_POINTS],
+    y_m: [f32; MOST_POINTS],
+    /// 1 for each of them; what only fills the last vector counts nothing.
+    weight: [f32; MOST_POINTS],
 }
 
 /// Points that are compared together.
-const TOGETHER: usize = 4;
+const TOGETHER: usize = 8;
 
 impl Sample {
     fn of(points_m: &[[f64; 2]]) -> Self {
         let stride = points_m.len().div_ceil(MOST_POINTS).max(1);
-        // What is not filled stands where a point is, too, and widens no rectangle.
-        let [x, y] = points_m.first().copied().unwrap_or_default();
+        let first = points_m.first().copied().unwrap_or_default();
+        // What is not filled stands where the first point is, and widens no rectangle.
         let mut sample = Self {
-            count: 0,
-            x_m: [x; MOST_POINTS],
-            y_m: [y; MOST_POINTS],
+            vectors: points_m.len().div_ceil(stride).div_ceil(TOGETHER),
+            x_m: [0.0; MOST_POINTS],
+            y_m: [0.0; MOST_POINTS],
+            weight: [0.0; MOST_POINTS],
         };
-        for [x, y] in points_m.iter().step_by(stride) {
-            (sample.x_m[sample.count], sample.y_m[sample.count]) = (*x, *y);
-            sample.count += 1;
+        for (place, [x, y]) in points_m.iter().step_by(stride).enumerate() {
+            sample.x_m[place] = (x - first[0]) as f32;
+            sample.y_m[place] = (y - first[1]) as f32;
+            sample.weight[place] = 1.0;
         }
         sample
     }
 
     /// The direction in which the points lie closest to the edges of their rectangle.
     fn closest_rad(&self) -> f64 {
-        let mut best = (f64::MIN, 0.0);
-        for (step, (sine, cosine)) in TRIED.iter().enumerate() {
-            let closeness = closeness(self, *sine, *cosine);
-            if closeness > best.0 {
-                best = (closeness, tried_rad(step));
-            }
-        }
-        best.1
+        tried_rad(closest(self, &TRIED))
     }
 }
 
@@ -185,44 +183,63 @@ fn tried_rad(step: usize) -> f64 {
 }
 
 /// Sine and cosine of every direction that is tried.
-static TRIED: LazyLock<[(f64, f64); DIRECTIONS]> =
-    LazyLock::new(|| std::array::from_fn(|step| libm::sincos(tried_rad(step))));
+static TRIED: LazyLock<[(f32, f32); DIRECTIONS]> = LazyLock::new(|| {
+    std::array::from_fn(|step| {
+        let (sine, cosine) = libm::sincos(tried_rad(step));
+        (sine as f32, cosine as f32)
+    })
+});
 
-/// How close points lie to the edges of their rectangle: the sum of 1/distance. Written so that
-/// it vectorises.
+/// The number of the direction in which points lie closest to the edges of their rectangle.
+/// Written so that it vectorises.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-fn closeness(sample: &Sample, sine: f64, cosine: f64) -> f64 {
-    let (mut u_m, mut v_m) = ([0.0; MOST_POINTS], [0.0; MOST_POINTS]);
-    let count = sample.count.next_multiple_of(TOGETHER).min(MOST_POINTS);
-    let (x_m, y_m) = (&sample.x_m[..count], &sample.y_m[..count]);
-    let (u_m, v_m) = (&mut u_m[..count], &mut v_m[..count]);
-    for point in 0..count {
-        [u_m[point], v_m[point]] = turned(&[x_m[point], y_m[point]], sine, cosine);
-    }
-    let [u_low_m, u_high_m] = ends(u_m);
-    let [v_low_m, v_high_m] = ends(v_m);
-    for (u, v) in u_m.iter_mut().zip(v_m) {
-        let along_m = least(*u - u_low_m, u_high_m - *u);
-        let across_m = least(*v - v_low_m, v_high_m - *v);
-        *u = 1.0 / greatest(least(along_m, across_m), NEAREST_M);
-    }
-    u_m[..sample.count].iter().sum()
-}
-
-/// The least and the greatest of numbers, whose count is a multiple of [`TOGETHER`].
-#[inline(always)]
-fn ends(numbers: &[f64]) -> [f64; 2] {
-    let (mut low, mut high) = ([f64::MAX; TOGETHER], [f64::MIN; TOGETHER]);
-    for numbers in numbers.as_chunks::<TOGETHER>().0 {
-        for place in 0..TOGETHER {
-            low[place] = least(low[place], numbers[place]);
-            high[place] = greatest(high[place], numbers[place]);
+fn closest(sample: &Sample, tried: &[(f32, f32); DIRECTIONS]) -> usize {
+    let mut turned = [[[0.0; TOGETHER]; 2]; MOST_POINTS / TOGETHER];
+    let mut best = (f32::MIN, 0);
+    for (step, (sine, cosine)) in tried.iter().enumerate() {
+        let closeness = closeness(sample, *sine, *cosine, &mut turned);
+        if closeness > best.0 {
+            best = (closeness, step);
         }
     }
-    [
-        low.into_iter().fold(f64::MAX, least),
-        high.into_iter().fold(f64::MIN, greatest),
-    ]
+    best.1
+}
+
+/// How close points lie to the edges of their rectangle in a direction: the sum of 1/distance.
+/// `turned` is for their coordinates in it.
+#[inline(always)]
+fn closeness(
+    sample: &Sample,
+    sine: f32,
+    cosine: f32,
+    turned: &mut [[[f32; TOGETHER]; 2]; MOST_POINTS / TOGETHER],
+) -> f32 {
+    let ([mut low_u, mut low_v], [mut high_u, mut high_v]) =
+        ([[f32::MAX; TOGETHER]; 2], [[f32::MIN; TOGETHER]; 2]);
+    let (x_m, _) = sample.x_m.as_chunks::<TOGETHER>();
+    let (y_m, _) = sample.y_m.as_chunks::<TOGETHER>();
+    let (weight, _) = sample.weight.as_chunks::<TOGETHER>();
+    let count = sample.vectors.min(x_m.len());
+    for vector in 0..count {
+        for lane in 0..TOGETHER {
+            let (x, y) = (x_m[vector][lane], y_m[vector][lane]);
+            let (u, v) = (x * cosine + y * sine, y * cosine - x * sine);
+            (turned[vector][0][lane], turned[vector][1][lane]) = (u, v);
+            (low_u[lane], high_u[lane]) = (least(low_u[lane], u), greatest(high_u[lane], u));
+            (low_v[lane], high_v[lane]) = (least(low_v[lane], v), greatest(high_v[lane], v));
+        }
+    }
+    let (low_u, high_u) = (least_of(low_u), greatest_of(high_u));
+    let (low_v, high_v) = (least_of(low_v), greatest_of(high_v));
+    let mut sums = [0.0f32; TOGETHER];
+    for vector in 0..count {
+        for lane in 0..TOGETHER {
+            let (u, v) = (turned[vector][0][lane], turned[vector][1][lane]);
+            let edge_m = least(least(u - low_u, high_u - u), least(v - low_v, high_v - v));
+            sums[lane] += weight[vector][lane] / greatest(edge_m, NEAREST_M);
+        }
+    }
+    sums.iter().sum()
 }
 
 /// Least and greatest coordinates along and across a direction.
