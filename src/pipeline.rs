@@ -3,13 +3,13 @@
 use crate::cloud::{Dialect, Intake, Refusal, Revolution, Scan};
 use crate::cluster::Dbscan;
 use crate::config::Configuration;
-use crate::ego::{Ego, Heard, Pose, Sweep};
+use crate::ego::{Ego, Heard, Placement, Pose, Sweep};
 use crate::grid::{Grid, Perceived};
 use crate::ground::{Ground, GroundReport, Origin};
 use crate::publish::{Heading, Publisher};
 use crate::tally::Tally;
 use crate::time::{Span, Time};
-use crate::track::{Object, Tracker};
+use crate::track::{Object, Scene, Tracker};
 use crate::wire::point_cloud::{CompactPointCloud, POINT_CLOUD_ID};
 use crate::wire::status::Status;
 use crate::wire::{Envelope, Message, WireError, pose};
@@ -40,6 +40,8 @@ pub struct Pipeline {
     scan: Scan,
     ego: Ego,
     sweep: Sweep,
+    /// How the points of each column of the last revolution are placed.
+    placements: Vec<Placement>,
     ground: Ground,
     clusters: Dbscan,
     tracker: Tracker,
@@ -73,8 +75,6 @@ pub enum Step {
     Cluster,
     /// Clusters to objects.
     Track,
-    /// All of them to the map.
-    Grid,
 }
 
 /// What the steps say about a revolution.
@@ -168,6 +168,7 @@ impl Pipeline {
             scan: Scan::default(),
             ego: Ego::new(&configuration.ego),
             sweep: Sweep::still(0),
+            placements: vec![],
             ground: Ground::new(&configuration.ground),
             clusters: Dbscan::new(&configuration.cluster),
             tracker: Tracker::new(&configuration.track),
@@ -264,25 +265,21 @@ impl Pipeline {
         let swept = Span::from_seconds(-self.scan.duration_s());
         let sweep = self.ego.sweep(revolution.time + swept, revolution.time);
         self.sweep = sweep;
+        sweep.placements(self.scan.columns(), &mut self.placements);
         let expected = self.tracker.expect(revolution.time, &self.sweep);
         let ground = self.ground.process(&self.scan, expected);
         done(Step::Ground);
         let clusters = self.clusters.process(&self.scan, self.ground.mask());
         done(Step::Cluster);
-        let heights_m = self.ground.heights_m();
-        let objects = self
-            .tracker
-            .process(&self.scan, clusters, heights_m, &ground, &sweep);
-        done(Step::Track);
-        self.grid.process(&Perceived {
+        let scene = Scene {
             scan: &self.scan,
-            ground: self.ground.mask(),
-            heights_m,
-            plane: &ground.plane,
-            objects,
+            heights_m: self.ground.heights_m(),
+            ground: &ground,
             sweep: &sweep,
-        });
-        done(Step::Grid);
+            placements: &self.placements,
+        };
+        let objects = self.tracker.process(clusters, &scene);
+        done(Step::Track);
 
         let report = RevolutionReport {
             number: self.last.map_or(0, |last| last.number.wrapping_add(1)),
@@ -305,8 +302,13 @@ impl Pipeline {
         report
     }
 
-    /// The frames that answer the last revolution, in order.
-    pub fn publish(&mut self, sent: Time, processing_s: f32) -> impl Iterator<Item = &[u8]> {
+    /// The frames that say what is around in the last revolution, in the order in which they are
+    /// to be sent.
+    pub fn publish_objects(
+        &mut self,
+        sent: Time,
+        processing_s: f32,
+    ) -> impl Iterator<Item = &[u8]> {
         if let Some(last) = self.last {
             let heading = Heading {
                 revolution: last.number,
@@ -316,7 +318,31 @@ impl Pipeline {
                 sweep: &self.sweep,
             };
             self.publisher
-                .publish(&heading, self.tracker.objects(), &mut self.grid);
+                .publish_objects(&heading, self.tracker.objects());
+        }
+        self.publisher.frames()
+    }
+
+    /// Takes the last revolution into the map; to be called once for each. It is less urgent
+    /// than the objects.
+    pub fn update_map(&mut self) {
+        let Some(last) = &self.last else { return };
+        self.grid.process(&Perceived {
+            scan: &self.scan,
+            ground: self.ground.mask(),
+            heights_m: self.ground.heights_m(),
+            plane: &last.ground.plane,
+            objects: self.tracker.objects(),
+            sweep: &self.sweep,
+            placements: &self.placements,
+        });
+    }
+
+    /// The frames of what is to be sent of the map, the most urgent first.
+    pub fn publish_map(&mut self, sent: Time) -> impl Iterator<Item = &[u8]> {
+        if let Some(last) = self.last {
+            self.publisher
+                .publish_map(last.time, sent, &self.sweep, &mut self.grid);
         }
         self.publisher.frames()
     }

@@ -81,7 +81,7 @@ impl Publisher {
         }
     }
 
-    /// The frames of the last revolution in the order in which they are to be sent.
+    /// The frames that were made last, in the order in which they are to be sent.
     pub fn frames(&self) -> impl Iterator<Item = &[u8]> {
         let starts = std::iter::once(0).chain(self.ends.iter().copied());
         starts
@@ -89,8 +89,8 @@ impl Publisher {
             .map(|(start, end)| &self.bytes[start..*end])
     }
 
-    /// Makes the frames of a revolution: its objects, and what is to be sent of the map.
-    pub fn publish(&mut self, heading: &Heading<'_>, objects: &[Object], grid: &mut Grid) {
+    /// Makes the frames of a revolution's objects.
+    pub fn publish_objects(&mut self, heading: &Heading<'_>, objects: &[Object]) {
         self.bytes.clear();
         self.ends.clear();
         let mut kept = std::mem::take(&mut self.kept);
@@ -122,9 +122,18 @@ impl Publisher {
             );
         }
         self.kept = kept;
-        grid.publish(heading.time, heading.sweep, |tile| {
-            self.put(&postmark, tile)
-        });
+    }
+
+    /// Makes the frames of what is to be sent of the map after the revolution of a time.
+    pub fn publish_map(&mut self, time: Time, sent: Time, sweep: &Sweep, grid: &mut Grid) {
+        self.bytes.clear();
+        self.ends.clear();
+        let postmark = Postmark {
+            sent,
+            sampled: time,
+            sender_stamp: self.sender_stamp,
+        };
+        grid.publish(time, sweep, |tile| self.put(&postmark, tile));
     }
 
     fn put<M: Message>(&mut self, postmark: &Postmark, message: &M) {
@@ -302,7 +311,6 @@ impl Sight {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::GridParameters;
     use crate::parameter::Profile;
     use crate::track::Class;
     use crate::wire::Envelope;
@@ -348,8 +356,7 @@ mod tests {
         let mut parameters = PublishParameters::profile(Profile::Default);
         edit(&mut parameters);
         let mut publisher = Publisher::new(&parameters, 42);
-        let grid = &mut Grid::new(&GridParameters::profile(Profile::Default));
-        publisher.publish(&heading(), objects, grid);
+        publisher.publish_objects(&heading(), objects);
         publisher
     }
 

@@ -84,7 +84,9 @@ fn a_warm_revolution_allocates_nothing() {
             let (envelope, _) = Envelope::from_datagram(&frame).unwrap();
             let before = ALLOCATIONS.get();
             let outcome = pipeline.handle(&envelope).unwrap();
-            let sent = pipeline.publish(Time::ZERO, 0.0).count();
+            let sent = pipeline.publish_objects(Time::ZERO, 0.0).count();
+            pipeline.update_map();
+            pipeline.publish_map(Time::ZERO).count();
             *allocations += ALLOCATIONS.get() - before;
             assert!(matches!(outcome, Outcome::Revolution(_)) && sent > 0);
         }

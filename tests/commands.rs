@@ -78,7 +78,7 @@ fn every_complete_revolution_of_a_real_drive_gives_a_list_above_a_road_1_6_m_bel
         assert!((1.5..1.75).contains(&plane.height_m()), "{plane:?}");
         assert!(plane.tilt_rad() < 0.05, "{plane:?}");
         assert!(report.ground.points > 3000, "{report:?}");
-        let frames = pipeline.publish(report.time, 0.0);
+        let frames = pipeline.publish_objects(report.time, 0.0);
         let ids = frames.map(|frame| Envelope::from_datagram(frame).unwrap().0.data_type);
         lists += ids.filter(|id| *id == ObjectList::ID).count();
     }

@@ -108,7 +108,8 @@ impl Drive {
         let mut frame = vec![];
         postmark(self.now).put_payload(&mut frame, 49, |out| cloud.encode(out));
         self.send(&frame);
-        let frames = self.pipeline.publish(self.now, 0.0);
+        self.pipeline.update_map();
+        let frames = self.pipeline.publish_map(self.now);
         let envelopes = frames.map(|frame| Envelope::from_datagram(frame).unwrap().0);
         envelopes
             .filter(|envelope| envelope.data_type == GridTile::ID)

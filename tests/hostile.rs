@@ -111,16 +111,14 @@ impl Session {
     /// An object list of numbers that are finite, and tiles that can be drawn.
     fn check_answer(&mut self, question: &Envelope<'_>) {
         self.answers += 1;
-        let frames: Vec<_> = self.pipeline.publish(self.now, 0.01).collect();
-        let [frame, tiles @ ..] = &frames[..] else {
-            panic!("no frames")
-        };
-        for frame in tiles {
+        self.pipeline.update_map();
+        for frame in self.pipeline.publish_map(self.now) {
             let (envelope, _) = Envelope::from_datagram(frame).unwrap();
             let tile = GridTile::decode(envelope.payload, envelope.payload_offset).unwrap();
             assert!(tile.levels(tile.map_id).is_ok(), "{tile:?}");
         }
-        let (envelope, rest) = Envelope::from_datagram(frame).unwrap();
+        let mut frames = self.pipeline.publish_objects(self.now, 0.01);
+        let (envelope, rest) = Envelope::from_datagram(frames.next().unwrap()).unwrap();
         assert_eq!(
             (envelope.data_type, envelope.sender_stamp, rest),
             (2021, 7, 0)

@@ -92,46 +92,62 @@ mod mark {
             )*
         };
     }
-    marks! { step_begins step_cloud step_ground step_cluster step_track step_grid step_publish }
+    marks! { step_begins step_cloud step_ground step_cluster step_track step_objects step_grid step_tiles }
 
-    pub(super) const DONE: [fn(); 5] =
-        [step_cloud, step_ground, step_cluster, step_track, step_grid];
+    pub(super) const DONE: [fn(); super::PARTS] = [
+        step_cloud,
+        step_ground,
+        step_cluster,
+        step_track,
+        step_objects,
+        step_grid,
+        step_tiles,
+    ];
 }
 
-/// Names of what is timed: the pipeline's steps, making the frames, and all of it.
-pub(crate) const NAMES: [&str; 7] = [
-    "cloud", "ground", "cluster", "track", "grid", "publish", "whole",
+/// What is timed one by one.
+const PARTS: usize = 7;
+/// Names of what is timed: the pipeline's steps to the frames of the objects, then the map and
+/// the frames of its tiles, and all of it.
+pub(crate) const NAMES: [&str; PARTS + 1] = [
+    "cloud", "ground", "cluster", "track", "objects", "grid", "tiles", "whole",
 ];
 /// Revolutions before everything is warm.
 pub(crate) const WARM: usize = 5;
 
 /// Times of every part in microseconds, a list each as in [`NAMES`].
-pub(crate) fn drive(frames: &[Vec<u8>], configuration: &Configuration) -> [Vec<f64>; 7] {
+pub(crate) fn drive(frames: &[Vec<u8>], configuration: &Configuration) -> [Vec<f64>; PARTS + 1] {
     let mut pipeline = Pipeline::new(configuration, 0);
-    let mut times_us: [Vec<f64>; 7] = Default::default();
+    let mut times_us: [Vec<f64>; PARTS + 1] = Default::default();
     for frame in frames {
         mark::step_begins();
         let begin = cpu_time();
-        let mut ends = [begin; 6];
+        let mut ends = [begin; PARTS];
+        let done = |part: usize, ends: &mut [Duration; PARTS]| {
+            mark::DONE[part]();
+            ends[part] = cpu_time();
+        };
         let (envelope, _) = Envelope::from_datagram(frame).unwrap();
         let outcome = pipeline.handle_watched(&envelope, |step| {
-            mark::DONE[step as usize]();
-            ends[step as usize] = cpu_time();
+            done(step as usize, &mut ends);
         });
         match outcome {
             Ok(Outcome::Revolution(_)) => {}
             Ok(Outcome::Pose) => continue,
             other => panic!("{other:?}"),
         }
-        black_box(pipeline.publish(Time::ZERO, 0.0).count());
-        mark::step_publish();
-        ends[mark::DONE.len()] = cpu_time();
+        black_box(pipeline.publish_objects(Time::ZERO, 0.0).count());
+        done(4, &mut ends);
+        pipeline.update_map();
+        done(5, &mut ends);
+        black_box(pipeline.publish_map(Time::ZERO).count());
+        done(6, &mut ends);
         let mut from = begin;
         for (part, end) in ends.into_iter().enumerate() {
             times_us[part].push((end - from).as_secs_f64() * 1e6);
             from = end;
         }
-        times_us[6].push((from - begin).as_secs_f64() * 1e6);
+        times_us[PARTS].push((from - begin).as_secs_f64() * 1e6);
     }
     times_us.map(|times_us| times_us[WARM..].to_vec())
 }

@@ -132,7 +132,13 @@ impl Process<'_> {
 
     fn answer(&mut self, report: &RevolutionReport) -> Result<()> {
         if let Some(output) = &mut self.output {
-            for frame in self.pipeline.publish(report.time, 0.0) {
+            for frame in self.pipeline.publish_objects(report.time, 0.0) {
+                output.put(frame)?;
+            }
+        }
+        self.pipeline.update_map();
+        if let Some(output) = &mut self.output {
+            for frame in self.pipeline.publish_map(report.time) {
                 output.put(frame)?;
             }
         }

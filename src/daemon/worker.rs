@@ -72,13 +72,13 @@ impl<'a> Worker<'a> {
         match self.pipeline.handle(&envelope) {
             Ok(Outcome::Revolution(report)) => {
                 let processing_s = begin.elapsed().as_secs_f32();
-                for frame in self.pipeline.publish(now(), processing_s) {
-                    if let Err(error) = self.sender.send(frame) {
-                        self.log.note("send", || error.to_string());
-                    }
-                }
+                let frames = self.pipeline.publish_objects(now(), processing_s);
+                send(&self.sender, frames, &mut self.log);
                 self.latency.record(now() - job.arrival);
                 self.vitals.answered();
+                self.pipeline.update_map();
+                let frames = self.pipeline.publish_map(now());
+                send(&self.sender, frames, &mut self.log);
                 self.tell(&report);
             }
             Ok(_) => {}
@@ -129,9 +129,7 @@ impl<'a> Worker<'a> {
         };
         self.frame.clear();
         postmark.put(&mut self.frame, &status);
-        if let Err(error) = self.sender.send(&self.frame) {
-            self.log.note("send", || error.to_string());
-        }
+        send(&self.sender, [&self.frame[..]], &mut self.log);
         debug!("{status:?}");
         self.statuses += 1;
         if self.statuses.is_multiple_of(LOGGED) {
@@ -190,5 +188,14 @@ impl<'a> Worker<'a> {
             report.clusters,
             report.objects,
         );
+    }
+}
+
+/// Sends frames; what cannot be sent is told.
+fn send<'a>(sender: &Sender, frames: impl IntoIterator<Item = &'a [u8]>, log: &mut FaultLog) {
+    for frame in frames {
+        if let Err(error) = sender.send(frame) {
+            log.note("send", || error.to_string());
+        }
     }
 }

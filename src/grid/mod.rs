@@ -121,7 +121,6 @@ pub struct Grid {
     window: Window,
     evidence: Evidence,
     casting: Casting,
-    placements: Vec<Placement>,
     passed: Vec<Stretch>,
     /// Cells in which rays ended, and how high.
     hits: Vec<(Cell, u8)>,
@@ -144,6 +143,8 @@ pub struct Perceived<'a> {
     pub objects: &'a [Object],
     /// Where the sensor was.
     pub sweep: &'a Sweep,
+    /// How the points of each column are placed.
+    pub placements: &'a [Placement],
 }
 
 impl Grid {
@@ -164,7 +165,6 @@ impl Grid {
             window: Window::new(window_side),
             evidence: Evidence::default(),
             casting: Casting::default(),
-            placements: vec![],
             passed: vec![],
             hits: Vec::with_capacity(CAPACITY),
             is_moving: Vec::with_capacity(CAPACITY),
@@ -204,6 +204,7 @@ impl Grid {
             heights_m,
             plane,
             sweep,
+            placements,
             ..
         } = *perceived;
         self.begin_map(sweep, scan.time());
@@ -216,7 +217,6 @@ impl Grid {
         self.map.keep_around(home);
         let half = (self.window.side() / 2) as i32;
         self.window.begin(home.map(|tile| tile - half));
-        sweep.placements(scan.columns(), &mut self.placements);
         evidence::gather(
             &mut self.evidence,
             scan,
@@ -226,12 +226,12 @@ impl Grid {
             &self.parameters,
         );
         self.mark_returns(perceived);
-        self.mark_passed(scan);
+        self.mark_passed(scan, placements);
         let view = View {
             scan,
             ground,
             evidence: &self.evidence,
-            placements: &self.placements,
+            placements,
             sensor,
             revolution: self.revolution,
         };
@@ -271,6 +271,7 @@ impl Grid {
             scan,
             objects,
             sweep,
+            placements,
             ..
         } = *perceived;
         self.is_moving.clear();
@@ -280,7 +281,6 @@ impl Grid {
             .filter(|object| moving::moves(object, &self.parameters));
         for object in moving {
             let margin_m = self.parameters.moving_margin_m;
-            let placements = &self.placements;
             moving::mark_returns(
                 object,
                 scan,
@@ -302,7 +302,7 @@ impl Grid {
                     continue;
                 }
                 let [x, y, _] = scan.point_m(point).map(f64::from);
-                let at_m = self.placements[column].local_m([x, y]);
+                let at_m = placements[column].local_m([x, y]);
                 let cells = [0, 1].map(|axis| at_m[axis] * per_cell - corner[axis]);
                 if let Some(cell) = self.window.hit(cells) {
                     let top = (perceived.heights_m[point] / HEIGHT_UNIT_M) as u8;
@@ -313,12 +313,12 @@ impl Grid {
     }
 
     /// Marks the cells that rays passed.
-    fn mark_passed(&mut self, scan: &Scan) {
+    fn mark_passed(&mut self, scan: &Scan, placements: &[Placement]) {
         evidence::stretches(&mut self.evidence, &self.parameters, &mut self.passed);
         self.casting.cast(
             &self.passed,
             scan,
-            &self.placements,
+            placements,
             self.parameters.cell_m,
             &mut self.window,
         );

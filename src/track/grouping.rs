@@ -204,7 +204,7 @@ impl Grouping {
                         continue;
                     }
                     let [x, y, _] = scan.point_m(point).map(f64::from);
-                    let at_m = self.placer.placements()[column].local_m([x, y]);
+                    let at_m = scene.placements[column].local_m([x, y]);
                     if outline.distance_m(at_m) < STRAY_M {
                         self.spots.push(Spot {
                             at_m: Vector2::from(at_m),

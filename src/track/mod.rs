@@ -39,7 +39,7 @@ pub use rectangle::{Outline, Rectangle};
 
 use crate::cloud::Scan;
 use crate::cluster::Clusters;
-use crate::ego::{Pose, Sweep};
+use crate::ego::{Placement, Pose, Sweep};
 use crate::ground::GroundReport;
 use crate::parameter::{choices, parameters};
 use crate::time::Time;
@@ -139,13 +139,18 @@ impl Object {
 }
 
 /// What a revolution brings, beside its clusters.
-#[derive(Clone, Copy)]
-struct Scene<'a> {
-    scan: &'a Scan,
-    /// Of its points above the ground.
-    heights_m: &'a [f32],
-    ground: &'a GroundReport,
-    sweep: &'a Sweep,
+#[derive(Debug, Clone, Copy)]
+pub struct Scene<'a> {
+    /// Its points.
+    pub scan: &'a Scan,
+    /// Their heights above the ground.
+    pub heights_m: &'a [f32],
+    /// The ground around the sensor.
+    pub ground: &'a GroundReport,
+    /// Where the sensor was.
+    pub sweep: &'a Sweep,
+    /// How the points of each column are placed.
+    pub placements: &'a [Placement],
 }
 
 /// The track step.
@@ -199,28 +204,20 @@ impl Tracker {
         &self.expected
     }
 
-    /// Takes the clusters of a revolution in. `heights_m` are its points' heights above the
-    /// ground, `sweep` the sensor's poses meanwhile.
-    pub fn process(
-        &mut self,
-        scan: &Scan,
-        clusters: &Clusters,
-        heights_m: &[f32],
-        ground: &GroundReport,
-        sweep: &Sweep,
-    ) -> &[Object] {
+    /// Takes the clusters of a revolution in.
+    pub fn process(&mut self, clusters: &Clusters, scene: &Scene<'_>) -> &[Object] {
+        let Scene {
+            scan,
+            ground,
+            sweep,
+            ..
+        } = *scene;
         match self.parameters.method {
             Method::Objects => {
                 if let Some((from, to)) = self.change_of_frame(sweep) {
                     self.by_object.reframe(&from, &to);
                 }
-                let scene = Scene {
-                    scan,
-                    heights_m,
-                    ground,
-                    sweep,
-                };
-                self.by_object.process(clusters, &scene, &self.parameters);
+                self.by_object.process(clusters, scene, &self.parameters);
             }
             Method::Nearest => {
                 self.by_distance

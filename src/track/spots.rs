@@ -5,7 +5,6 @@ use nalgebra::Vector2;
 use super::{Scene, TrackParameters};
 use crate::cloud::Scan;
 use crate::cluster::Clusters;
-use crate::ego::Placement;
 use crate::float::{greatest, least};
 
 /// One return.
@@ -63,7 +62,6 @@ impl Patch {
 /// Places returns and divides clusters.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Placer {
-    placements: Vec<Placement>,
     floor: Floor,
     /// Where on it each spot lies.
     places: Vec<usize>,
@@ -80,9 +78,10 @@ pub(super) struct Placer {
 /// Cells of one cluster, seen from above, and which of them touch.
 #[derive(Debug, Clone, Default)]
 struct Floor {
-    cell_m: f64,
+    /// Cells in a metre.
+    per_m: f64,
     /// The cell in the south-west corner, one beyond the cluster.
-    corner: [i32; 2],
+    corner: Vector2<f64>,
     /// Cells from south to north, one more than the cluster has on either side.
     height: usize,
     /// For every place, one more than the number of the cell in it; 0 where there is none.
@@ -100,9 +99,10 @@ impl Floor {
             self.numbers[*place as usize] = 0;
         }
         self.places.clear();
-        self.cell_m = cell_m;
-        let [low, high] = [self.cell(low_m), self.cell(high_m)];
-        self.corner = low.map(|cell| cell - 1);
+        self.per_m = 1.0 / cell_m;
+        let cells = |at_m: Vector2<f64>| (at_m * self.per_m).map(libm::floor);
+        let (low, high) = (cells(low_m), cells(high_m));
+        self.corner = low.add_scalar(-1.0);
         let side = |axis: usize| (high[axis] - low[axis]) as usize + 3;
         self.height = side(1);
         let size = side(0) * self.height;
@@ -111,19 +111,10 @@ impl Floor {
         }
     }
 
-    fn cell(&self, at_m: Vector2<f64>) -> [i32; 2] {
-        let cell = |metres: f64| {
-            let cells = metres / self.cell_m;
-            let toward_0 = cells as i32;
-            toward_0 - i32::from(f64::from(toward_0) > cells)
-        };
-        [cell(at_m.x), cell(at_m.y)]
-    }
-
     fn place(&self, at_m: Vector2<f64>) -> usize {
-        let [x, y] = self.cell(at_m);
-        let [x, y] = [x - self.corner[0], y - self.corner[1]];
-        x as usize * self.height + y as usize
+        // Nothing lies outside the corner, so that cutting off the fraction is enough.
+        let cell = |axis: usize| (at_m[axis] * self.per_m - self.corner[axis]) as u32 as usize;
+        cell(0) * self.height + cell(1)
     }
 
     /// Adds the cell at a place, if it is not there yet.
@@ -190,11 +181,6 @@ const GOES_ON: f64 = 0.5;
 const SMALLEST_DIVIDED_M: f64 = 1.0;
 
 impl Placer {
-    /// How the points of each column of the last revolution were placed.
-    pub(super) fn placements(&self) -> &[Placement] {
-        &self.placements
-    }
-
     /// Places the points of every cluster with the sensor's pose at the time of their column,
     /// and divides every cluster into parts that touch each other, seen from above. DBSCAN's
     /// distance must bridge two layers; seen from above there are no layers.
@@ -206,10 +192,9 @@ impl Placer {
         spots: &mut Vec<Spot>,
         patches: &mut Vec<Patch>,
     ) {
-        let Scene { scan, sweep, .. } = *scene;
+        let scan = scene.scan;
         spots.clear();
         patches.clear();
-        sweep.placements(scan.columns(), &mut self.placements);
         for points in clusters.iter() {
             let begin = spots.len();
             spots.extend(points.iter().map(|point| {
@@ -217,7 +202,7 @@ impl Placer {
                 let column = scan.column(number);
                 let [x, y, _] = scan.point_m(number).map(f64::from);
                 Spot {
-                    at_m: Vector2::from(self.placements[column].local_m([x, y])),
+                    at_m: Vector2::from(scene.placements[column].local_m([x, y])),
                     above_m: f64::from(scene.heights_m[number]),
                     age_s: scan.age_s(column),
                     point: *point,
