@@ -31,8 +31,9 @@ const POSE_IDS: [i32; 7] = [
 /// The whole of perception: an envelope in, envelopes out.
 ///
 /// [`Pipeline::handle`] takes every envelope of the session in the order in which they come.
-/// When it answers [`Outcome::Revolution`], [`Pipeline::publish`] makes the frames to send.
-/// Neither knows a clock: the caller says when it is.
+/// When it answers [`Outcome::Revolution`], [`Pipeline::publish_objects`] makes the frames to send,
+/// and [`Pipeline::update_map`] and [`Pipeline::publish_map`] see to the map.
+/// None of them knows a clock: the caller says when it is.
 #[derive(Debug, Clone)]
 pub struct Pipeline {
     configuration: Configuration,
