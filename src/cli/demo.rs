@@ -49,9 +49,9 @@ async fn demonstrate(arguments: &Arguments) -> Result<()> {
         sender_stamp: SENDER_STAMP,
         configuration,
     };
-    let end = arguments.duration.map(Duration::from_secs_f64);
+    let duration = arguments.duration.map(Duration::from_secs_f64);
     let stop = async {
-        match end {
+        match duration {
             Some(duration) => tokio::select! {
                 () = tokio::time::sleep(duration) => {}
                 () = stop_signal() => {}
@@ -59,9 +59,17 @@ async fn demonstrate(arguments: &Arguments) -> Result<()> {
             None => stop_signal().await,
         }
     };
+    // Looking at the simulated world takes longer than perceiving it; nobody waits for that.
+    let (ended, end) = tokio::sync::oneshot::channel();
+    let seed = arguments.seed;
+    std::thread::spawn(move || {
+        let sent = block_on(simulate::send(&roundabout, seed, 1.0, &sender));
+        // Nobody listens when the demo is over.
+        let _ = ended.send(sent);
+    });
     tokio::select! {
         result = daemon::run(options, stop) => Ok(result?),
-        result = simulate::send(&roundabout, arguments.seed, 1.0, &sender) => result,
+        Ok(result) = end => result,
         result = show_objects(session) => result,
     }
 }
