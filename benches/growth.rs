@@ -8,10 +8,9 @@
 
 mod common;
 
-use common::{NAMES, at_time, drive, plain_pass, quantiles, street};
+use common::{NAMES, drive, frame_of, plain_pass, quantiles, street, time_of};
 use kreisel::config::Configuration;
 use kreisel::wire::Envelope;
-use kreisel::wire::envelope::Postmark;
 use kreisel::wire::point_cloud::{CompactPointCloud, POINT_CLOUD_ID};
 
 /// Times of the steps, the whole, and the whole in passes.
@@ -59,13 +58,7 @@ fn with_columns(frames: &[Vec<u8>], columns: usize) -> Vec<Vec<u8>> {
             distances: &distances,
             ..cloud
         };
-        let postmark = Postmark {
-            sampled: envelope.sample_time_stamp.time(),
-            ..Postmark::default()
-        };
-        let mut frame = vec![];
-        postmark.put_payload(&mut frame, POINT_CLOUD_ID, |out| cloud.encode(out));
-        frame
+        frame_of(&cloud, envelope.sample_time_stamp.time())
     };
     frames.iter().map(resampled).collect()
 }
@@ -118,9 +111,7 @@ fn people(count: usize, revolution: usize) -> Vec<u8> {
         distances: &distances,
         ..CompactPointCloud::default()
     };
-    let mut frame = vec![];
-    Postmark::default().put_payload(&mut frame, POINT_CLOUD_ID, |out| cloud.encode(out));
-    at_time(&frame, revolution)
+    frame_of(&cloud, time_of(revolution))
 }
 
 fn main() {

@@ -14,11 +14,10 @@
 
 mod common;
 
-use common::{NAMES, WARM, at_time, drive, plain_pass, quantiles, street};
+use common::{NAMES, WARM, drive, frame_of, plain_pass, quantiles, street, time_of};
 use kreisel::config::Configuration;
-use kreisel::wire::Recording;
-use kreisel::wire::envelope::Postmark;
 use kreisel::wire::point_cloud::CompactPointCloud;
+use kreisel::wire::{Envelope, Recording};
 
 /// Three revolutions of a drive, again and again.
 fn real(rounds: usize) -> Option<Vec<Vec<u8>>> {
@@ -37,6 +36,13 @@ fn real(rounds: usize) -> Option<Vec<Vec<u8>>> {
     )
 }
 
+/// A revolution's frame with another time.
+fn at_time(frame: &[u8], round: usize) -> Vec<u8> {
+    let (envelope, _) = Envelope::from_datagram(frame).unwrap();
+    let cloud = CompactPointCloud::decode(envelope.payload, 0).unwrap();
+    frame_of(&cloud, time_of(round))
+}
+
 /// 2,000 columns of 16 returns at all distances, none of them ground.
 fn worst(rounds: usize) -> Vec<Vec<u8>> {
     let distance = |n: u32| match n % 16 {
@@ -53,9 +59,9 @@ fn worst(rounds: usize) -> Vec<Vec<u8>> {
         distances: &distances,
         ..CompactPointCloud::default()
     };
-    let mut frame = vec![];
-    Postmark::default().put_payload(&mut frame, 49, |out| cloud.encode(out));
-    (0..rounds).map(|round| at_time(&frame, round)).collect()
+    (0..rounds)
+        .map(|round| frame_of(&cloud, time_of(round)))
+        .collect()
 }
 
 fn bench(name: &str, frames: &[Vec<u8>], reaches_m: &[f64]) {

@@ -47,6 +47,9 @@ pub mod config;
 // How a stage declares its parameters: unit, range, two profiles.
 pub mod parameter;
 
+// Why an envelope was of no use.
+mod fault;
+
 // Counters by name.
 pub mod tally;
 
@@ -63,7 +66,7 @@ pub mod random;
 // A synthetic session with truth.
 pub mod simulate;
 
-// Sockets, threads, signals: the shell around the pipeline.
+// Sockets, signals: the shell around the pipeline.
 #[cfg(feature = "shell")]
 pub mod daemon;
 

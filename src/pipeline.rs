@@ -1,18 +1,19 @@
 //! All the steps, in order. This is the one place that names them all.
 
-use crate::cloud::{Dialect, Intake, Refusal, Revolution, Scan};
+use crate::cloud::{Dialect, Intake, Revolution, Scan};
 use crate::cluster::Dbscan;
 use crate::config::Configuration;
 use crate::ego::{Ego, Heard, Placement, Pose, Sweep};
 use crate::grid::{Grid, Perceived};
 use crate::ground::{Ground, GroundReport, Origin};
 use crate::publish::{Heading, Publisher};
-use crate::tally::Tally;
 use crate::time::{Span, Time};
 use crate::track::{Object, Scene, Tracker};
 use crate::wire::point_cloud::{CompactPointCloud, POINT_CLOUD_ID};
 use crate::wire::status::Status;
-use crate::wire::{Envelope, Message, WireError, pose};
+use crate::wire::{Envelope, Message, pose};
+
+pub use crate::fault::{Counts, Fault};
 
 /// Message numbers that are ours: what we send, heard back.
 const OWN_IDS: std::ops::RangeInclusive<i32> = 2020..=2039;
@@ -105,60 +106,6 @@ pub struct RevolutionReport {
     pub clusters: usize,
     /// Objects to be published.
     pub objects: usize,
-}
-
-/// Why an envelope was of no use.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Fault {
-    /// Its bytes do not fit its message.
-    #[error("message {data_type}: {error}")]
-    Damaged {
-        /// The envelope's data type.
-        data_type: i32,
-        /// What is wrong.
-        error: WireError,
-    },
-    /// A point cloud that is no whole revolution, or that the array cannot hold.
-    #[error("point cloud refused: {0}")]
-    Refused(#[from] Refusal),
-    /// A pose whose numbers cannot be a vehicle's on the earth.
-    #[error("message {data_type}: its numbers are no pose on the earth")]
-    ImplausiblePose {
-        /// The envelope's data type.
-        data_type: i32,
-    },
-}
-
-impl Fault {
-    /// A short name for counters and logs.
-    pub const fn name(&self) -> &'static str {
-        match self {
-            Self::Damaged { error, .. } => error.name(),
-            Self::Refused(refusal) => refusal.name(),
-            Self::ImplausiblePose { .. } => "pose_implausible",
-        }
-    }
-}
-
-/// What was counted since the beginning.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// Point clouds handed in.
-    pub revolutions: u64,
-    /// Point clouds refused.
-    pub refused: u64,
-    /// Messages whose bytes do not fit.
-    pub damaged: u64,
-    /// Poses read.
-    pub poses: u64,
-    /// Revolutions that kept the last good plane.
-    pub ground_held: u64,
-    /// Revolutions at the configured height.
-    pub ground_fallback: u64,
-    /// Leaps in time.
-    pub time_jumps: u64,
-    /// All faults by name.
-    pub faults: Tally,
 }
 
 impl Pipeline {

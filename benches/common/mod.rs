@@ -8,7 +8,7 @@ use kreisel::pipeline::{Outcome, Pipeline};
 use kreisel::simulate::{Simulation, scenario};
 use kreisel::time::Time;
 use kreisel::wire::envelope::Postmark;
-use kreisel::wire::point_cloud::CompactPointCloud;
+use kreisel::wire::point_cloud::{CompactPointCloud, POINT_CLOUD_ID};
 use kreisel::wire::{Envelope, Recording};
 
 /// CPU time of this thread: other processes do not count.
@@ -66,16 +66,19 @@ pub(crate) fn street(rounds: usize) -> Vec<Vec<u8>> {
     frames
 }
 
-/// A revolution's frame with another time.
-pub(crate) fn at_time(frame: &[u8], round: usize) -> Vec<u8> {
-    let (envelope, _) = Envelope::from_datagram(frame).unwrap();
-    let cloud = CompactPointCloud::decode(envelope.payload, 0).unwrap();
+/// When the revolutions end that are sent ten a second.
+pub(crate) fn time_of(round: usize) -> Time {
+    Time::from_micros(1_700_000_000_000_000 + 100_000 * round as i64)
+}
+
+/// The frame of a revolution that ended at a time.
+pub(crate) fn frame_of(cloud: &CompactPointCloud<'_>, sampled: Time) -> Vec<u8> {
     let postmark = Postmark {
-        sampled: Time::from_micros(1_700_000_000_000_000 + 100_000 * round as i64),
+        sampled,
         ..Postmark::default()
     };
     let mut frame = vec![];
-    postmark.put_payload(&mut frame, 49, |out| cloud.encode(out));
+    postmark.put_payload(&mut frame, POINT_CLOUD_ID, |out| cloud.encode(out));
     frame
 }
 
@@ -122,26 +125,24 @@ pub(crate) fn drive(frames: &[Vec<u8>], configuration: &Configuration) -> [Vec<f
     for frame in frames {
         mark::step_begins();
         let begin = cpu_time();
-        let mut ends = [begin; PARTS];
-        let done = |part: usize, ends: &mut [Duration; PARTS]| {
-            mark::DONE[part]();
-            ends[part] = cpu_time();
+        let mut ends = Vec::with_capacity(PARTS);
+        let done = |ends: &mut Vec<Duration>| {
+            mark::DONE[ends.len()]();
+            ends.push(cpu_time());
         };
         let (envelope, _) = Envelope::from_datagram(frame).unwrap();
-        let outcome = pipeline.handle_watched(&envelope, |step| {
-            done(step as usize, &mut ends);
-        });
+        let outcome = pipeline.handle_watched(&envelope, |_| done(&mut ends));
         match outcome {
             Ok(Outcome::Revolution(_)) => {}
             Ok(Outcome::Pose) => continue,
             other => panic!("{other:?}"),
         }
         black_box(pipeline.publish_objects(Time::ZERO, 0.0).count());
-        done(4, &mut ends);
+        done(&mut ends);
         pipeline.update_map();
-        done(5, &mut ends);
+        done(&mut ends);
         black_box(pipeline.publish_map(Time::ZERO).count());
-        done(6, &mut ends);
+        done(&mut ends);
         let mut from = begin;
         for (part, end) in ends.into_iter().enumerate() {
             times_us[part].push((end - from).as_secs_f64() * 1e6);

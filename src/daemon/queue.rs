@@ -7,7 +7,7 @@ use super::session::Datagram;
 use crate::time::Time;
 
 /// A datagram with a sound envelope.
-#[derive(Debug, PartialEq)]
+#[derive(Debug)]
 pub(super) struct Job {
     pub(super) datagram: Datagram,
     pub(super) arrival: Time,

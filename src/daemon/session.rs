@@ -53,7 +53,6 @@ pub struct Receiver {
 }
 
 /// A datagram in a buffer of its own, which the kernel writes into.
-#[derive(Clone, PartialEq, Eq)]
 pub struct Datagram {
     buffer: Box<[u8]>,
     length: usize,

@@ -2,12 +2,13 @@
 //!
 //! `minima` gathers the lowest returns of every pie slice, `ransac` finds the plane that most
 //! of them lie on, `plane` has the geometry, `surface` follows the heights above and below that
-//! plane outward, `passes` is what is done with all points at once, and this file follows the
-//! plane from revolution to revolution and marks the points.
+//! plane outward into a `profile` for each direction, `passes` is what is done with all points at
+//! once, and this file follows the plane from revolution to revolution and marks the points.
 
 mod minima;
 mod passes;
 mod plane;
+mod profile;
 mod ransac;
 mod surface;
 
@@ -250,10 +251,7 @@ impl Ground {
 
     /// Notes the returns within a distance of the plane and within the candidates' range.
     fn gather_near(&mut self, scan: &Scan, plane: &Plane, near_m: f64) {
-        let Cloud { x_m, y_m, z_m } = &mut self.near;
-        for coordinates in [&mut *x_m, y_m, z_m] {
-            coordinates.clear();
-        }
+        self.near.clear();
         if self.parameters.refinements == 0 {
             return;
         }
@@ -261,9 +259,7 @@ impl Ground {
         self.marks.resize(scan.len(), false);
         passes::mark_near(scan, plane, near_m as f32, far_squared, &mut self.marks);
         for point in marked(&self.marks) {
-            x_m.push(scan.x_m()[point]);
-            y_m.push(scan.y_m()[point]);
-            z_m.push(scan.z_m()[point]);
+            self.near.push(scan.point_m(point));
         }
     }
 

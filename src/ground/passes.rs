@@ -4,7 +4,7 @@ use multiversion::multiversion;
 
 use super::Plane;
 use super::plane::Moments;
-use super::surface::Profile;
+use super::profile::Profile;
 use crate::cloud::{MAX_LAYERS, Scan};
 
 /// Heights of all points above a plane.
@@ -143,9 +143,23 @@ pub(super) fn mark_near(
 /// Points by their coordinates.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Cloud {
-    pub(super) x_m: Vec<f32>,
-    pub(super) y_m: Vec<f32>,
-    pub(super) z_m: Vec<f32>,
+    x_m: Vec<f32>,
+    y_m: Vec<f32>,
+    z_m: Vec<f32>,
+}
+
+impl Cloud {
+    pub(super) fn clear(&mut self) {
+        self.x_m.clear();
+        self.y_m.clear();
+        self.z_m.clear();
+    }
+
+    pub(super) fn push(&mut self, [x, y, z]: [f32; 3]) {
+        self.x_m.push(x);
+        self.y_m.push(y);
+        self.z_m.push(z);
+    }
 }
 
 /// The moments of the points within `near_m` of a plane.
@@ -175,7 +189,7 @@ pub(super) fn moments_near(cloud: &Cloud, plane: &Plane, near_m: f64) -> Moments
         for coordinates in [&mut is_near, &mut x, &mut y, &mut z] {
             coordinates[end - begin..].fill(0.0);
         }
-        moments.weight += dot(&is_near, &is_near);
+        moments.count += dot(&is_near, &is_near);
         moments.x += dot(&is_near, &x);
         moments.y += dot(&is_near, &y);
         moments.z += dot(&is_near, &z);

@@ -45,7 +45,7 @@ impl Plane {
     pub fn fit(points: impl Iterator<Item = Vector3<f64>>) -> Option<Self> {
         let mut moments = Moments::default();
         for point in points {
-            moments.weight += 1.0;
+            moments.count += 1.0;
             moments.x += point.x;
             moments.y += point.y;
             moments.z += point.z;
@@ -91,10 +91,10 @@ impl Plane {
     }
 }
 
-/// Sums over points, each with a weight, from which the plane follows that fits them best.
+/// Sums over points, from which the plane follows that fits them best.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Moments {
-    pub(super) weight: f64,
+    pub(super) count: f64,
     pub(super) x: f64,
     pub(super) y: f64,
     pub(super) z: f64,
@@ -110,10 +110,10 @@ impl Moments {
     /// mean, so that d vanishes and a 2 x 2 system is left, solved by Cramer's rule; then the
     /// Hesse form from n = (a, b, 1) and the mean. `None` without points.
     pub(super) fn plane(&self) -> Option<Plane> {
-        if self.weight <= 0.0 {
+        if self.count <= 0.0 {
             return None;
         }
-        let mean = Vector3::new(self.x, self.y, self.z) / self.weight;
+        let mean = Vector3::new(self.x, self.y, self.z) / self.count;
         let xx = self.xx - mean.x * self.x;
         let xy = self.xy - mean.x * self.y;
         let yy = self.yy - mean.y * self.y;

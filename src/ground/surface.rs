@@ -11,6 +11,7 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use super::minima::slice_of;
+use super::profile::Profile;
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::track::{Outline, Rectangle};
 
@@ -33,11 +34,11 @@ pub(super) struct Surface {
 
 /// Where a layer meets the ground in a sector.
 #[derive(Debug, Clone, Copy, Default)]
-struct Ring {
+pub(super) struct Ring {
     /// Horizontal distance; 0 where nothing is known.
-    distance_m: f32,
+    pub(super) distance_m: f32,
     /// Above the plane.
-    level_m: f32,
+    pub(super) level_m: f32,
 }
 
 /// Part of a layer's returns in a sector that may lie below the ground: noise and reflections.
@@ -48,7 +49,7 @@ const FEWEST: usize = 3;
 const FARTHEST_M: f32 = 70.0;
 /// Steepest slope against the plane, and how much it may change: at once, and for each metre.
 /// A summit of 150 m radius changes it by 0.0067 each metre.
-const STEEPEST: f32 = 0.15;
+pub(super) const STEEPEST: f32 = 0.15;
 const BEND: f32 = 0.012;
 const BEND_PER_M: f32 = 0.0035;
 const MOST_BEND: f32 = 0.05;
@@ -56,8 +57,6 @@ const MOST_BEND: f32 = 0.05;
 const HIGHEST_M: f32 = 0.5;
 /// A rise from one return to the next above that no road has.
 const STEEP: f32 = 1.0;
-/// Rings closer to each other say nothing of a slope.
-const SHORTEST_RUN_M: f32 = 0.1;
 /// How far a level may be off besides.
 const SLACK_M: f32 = 0.06;
 /// Levels this near to the plane are always possible, kerbs among them; farther ones as far
@@ -278,82 +277,6 @@ struct Points<'a> {
     distances_m: &'a [f32],
 }
 
-/// Heights above the plane along a direction: straight between knots.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Profile {
-    count: usize,
-    knots: [Knot; Self::MOST],
-}
-
-/// Where the slope of the ground changes.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Knot {
-    pub(super) distance_m: f32,
-    pub(super) level_m: f32,
-    /// Behind it.
-    pub(super) slope: f32,
-}
-
-impl Profile {
-    /// Every layer's ring, the sensor, and the end of what the last one says.
-    const MOST: usize = MAX_LAYERS + 2;
-
-    const FLAT: Self = Self {
-        count: 1,
-        knots: [Knot {
-            distance_m: 0.0,
-            level_m: 0.0,
-            slope: 0.0,
-        }; Self::MOST],
-    };
-
-    /// Its knots from the inside out; the first one is below the sensor.
-    pub(super) fn knots(&self) -> &[Knot] {
-        &self.knots[..self.count]
-    }
-
-    fn through(rings: &[Ring; MAX_LAYERS]) -> Self {
-        let mut profile = Self::FLAT;
-        let mut run_m = 0.0;
-        for ring in rings {
-            let last = profile.count - 1;
-            if ring.distance_m > profile.knots[last].distance_m {
-                run_m = ring.distance_m - profile.knots[last].distance_m;
-                profile.knots[last].slope = (ring.level_m - profile.knots[last].level_m) / run_m;
-                profile.push(ring.distance_m, ring.level_m);
-            }
-        }
-        // Beyond the last ring it goes on as it came there, for as far as that was, if it came
-        // so for two rings: a single rise is a kerb.
-        let last = profile.count - 1;
-        if last > 0 && run_m > SHORTEST_RUN_M {
-            let slope = profile.knots[last - 1].slope.clamp(-STEEPEST, STEEPEST);
-            let before = last
-                .checked_sub(2)
-                .map_or(0.0, |ring| profile.knots[ring].slope);
-            let slope = if slope > 0.0 {
-                slope.min(before.max(0.0))
-            } else {
-                slope.max(before.min(0.0))
-            };
-            profile.knots[last].slope = slope;
-            let (distance_m, level_m) =
-                (profile.knots[last].distance_m, profile.knots[last].level_m);
-            profile.push(distance_m + run_m, level_m + slope * run_m);
-        }
-        profile
-    }
-
-    fn push(&mut self, distance_m: f32, level_m: f32) {
-        self.knots[self.count] = Knot {
-            distance_m,
-            level_m,
-            slope: 0.0,
-        };
-        self.count += 1;
-    }
-}
-
 /// The layers of a column that have a return, and those whose return is near and low enough to
 /// be the ground, a bit for each.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
@@ -404,33 +327,8 @@ mod tests {
     use super::*;
     use crate::cloud::sensor::VLP16;
     use crate::cloud::tests::scan_of;
-    use crate::ground::passes::{distances, lower};
-
-    /// How high the ground is above the plane.
-    fn ground_m(profile: &Profile, distance_m: f32) -> f32 {
-        let mut height_m = [0.0];
-        lower(profile, &[distance_m], &[distance_m], &mut height_m);
-        -height_m[0]
-    }
-
-    #[test]
-    fn a_kerb_goes_on_level_and_a_slope_as_it_came() {
-        let behind = |levels_m: [f32; 3]| {
-            let mut rings = [Ring::default(); MAX_LAYERS];
-            let ways = [12.0, 16.5, 22.5].into_iter().zip(levels_m);
-            for (ring, (distance_m, level_m)) in rings.iter_mut().zip(ways) {
-                *ring = Ring {
-                    distance_m,
-                    level_m,
-                };
-            }
-            ground_m(&Profile::through(&rings), 28.5)
-        };
-        assert_eq!(behind([0.0, 0.0, 0.12]), 0.12);
-        assert_eq!(behind([0.0, 0.0, -0.12]), -0.12);
-        assert!((behind([0.5, 0.95, 1.55]) - 2.15).abs() < 1e-3);
-        assert!((behind([-0.5, -0.95, -1.55]) + 2.15).abs() < 1e-3);
-    }
+    use crate::ground::passes::distances;
+    use crate::ground::profile::tests::ground_m;
 
     /// A road that is level to 10 m and then rises, with a car's rear across it.
     fn rising_road(slope: f64) -> Scan {

@@ -1,0 +1,59 @@
+//! Why an envelope was of no use, and how often.
+
+use crate::cloud::Refusal;
+use crate::tally::Tally;
+use crate::wire::WireError;
+
+/// Why an envelope was of no use.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Fault {
+    /// Its bytes do not fit its message.
+    #[error("message {data_type}: {error}")]
+    Damaged {
+        /// The envelope's data type.
+        data_type: i32,
+        /// What is wrong.
+        error: WireError,
+    },
+    /// A point cloud that is no whole revolution, or that the array cannot hold.
+    #[error("point cloud refused: {0}")]
+    Refused(#[from] Refusal),
+    /// A pose whose numbers cannot be a vehicle's on the earth.
+    #[error("message {data_type}: its numbers are no pose on the earth")]
+    ImplausiblePose {
+        /// The envelope's data type.
+        data_type: i32,
+    },
+}
+
+impl Fault {
+    /// A short name for counters and logs.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Damaged { error, .. } => error.name(),
+            Self::Refused(refusal) => refusal.name(),
+            Self::ImplausiblePose { .. } => "pose_implausible",
+        }
+    }
+}
+
+/// What was counted since the beginning.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Point clouds handed in.
+    pub revolutions: u64,
+    /// Point clouds refused.
+    pub refused: u64,
+    /// Messages whose bytes do not fit.
+    pub damaged: u64,
+    /// Poses read.
+    pub poses: u64,
+    /// Revolutions that kept the last good plane.
+    pub ground_held: u64,
+    /// Revolutions at the configured height.
+    pub ground_fallback: u64,
+    /// Leaps in time.
+    pub time_jumps: u64,
+    /// All faults by name.
+    pub faults: Tally,
+}
