@@ -2,11 +2,14 @@
 //!
 //! `dialect` finds what the message does not say (byte order) and what it says in two ways
 //! (intensity, unit). `intake` decides whether the message is one whole revolution that the
-//! array can hold, `refusal` says why not. `scan` is the array. `sensor` has the elevation tables.
+//! array can hold, `refusal` says why not. `scan` is the array, `passes` fills it.
+//! `sensor` has the elevation tables.
 
 mod dialect;
 
 mod intake;
+
+mod passes;
 
 mod refusal;
 

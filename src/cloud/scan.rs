@@ -1,7 +1,8 @@
 //! The static array of points that every later step reads.
 
+use super::passes::{self, Coordinates, Reading};
 use super::sensor::{self, Sensor};
-use super::{CloudParameters, Revolution};
+use super::{CloudParameters, Dialect, Revolution};
 use crate::ego::wrapped_rad;
 use crate::time::Time;
 use std::f64::consts::TAU;
@@ -74,56 +75,53 @@ impl Scan {
 
     /// Distances to metres; what is out of range is masked.
     fn read_ranges(&mut self, revolution: &Revolution<'_>, parameters: &CloudParameters) {
-        let dialect = revolution.dialect;
-        let kept = parameters.minimum_range_m as f32..=parameters.maximum_range_m as f32;
-        let layers = usize::from(revolution.cloud.layers);
-        let columns = revolution.cloud.distances.chunks_exact(2 * layers);
-        for (ranges_m, bytes) in self.range_m.chunks_exact_mut(MAX_LAYERS).zip(columns) {
-            for (range_m, bytes) in ranges_m.iter_mut().zip(bytes.as_chunks::<2>().0) {
-                let units = dialect.byte_order.join(*bytes) & dialect.distance_mask;
-                let measured_m = f32::from(units) * dialect.unit_m;
-                *range_m = match units {
-                    0 => 0.0,
-                    _ if kept.contains(&measured_m) => measured_m,
-                    _ => MASKED,
-                };
-            }
-            ranges_m[layers..].fill(MASKED);
-        }
+        let Dialect {
+            byte_order,
+            distance_mask,
+            unit_m,
+            ..
+        } = revolution.dialect;
+        let reading = Reading {
+            byte_order,
+            distance_mask,
+            unit_m,
+            minimum_m: parameters.minimum_range_m as f32,
+            maximum_m: parameters.maximum_range_m as f32,
+        };
+        passes::read_ranges(
+            revolution.cloud.distances,
+            usize::from(revolution.cloud.layers),
+            reading,
+            self.range_m.as_chunks_mut().0,
+        );
     }
 
-    /// Polar to Cartesian: x = d cos(v) sin(a), y = d cos(v) cos(a), z = d sin(v), with the
-    /// azimuth a clockwise from y. Sine and cosine of the azimuth advance by rotation, in
-    /// double precision: after 2,000 steps they are right to 1e-12.
+    /// Polar to Cartesian. Sine and cosine of the azimuth advance by rotation, in double
+    /// precision: after 2,000 steps they are right to 1e-12.
     fn place_points(&mut self) {
-        let mut elevation = [(0.0f32, 0.0f32); MAX_LAYERS];
-        for (slot, degrees) in elevation.iter_mut().zip(self.sensor.elevation_deg) {
-            let (sine, cosine) = libm::sincos(degrees.to_radians());
-            *slot = (sine as f32, cosine as f32);
-        }
+        let mut elevations = [[0.0f32; MAX_LAYERS]; 2];
         self.slopes = [UPRIGHT; MAX_LAYERS];
-        for (slope, degrees) in self.slopes.iter_mut().zip(self.sensor.elevation_deg) {
+        for (layer, degrees) in self.sensor.elevation_deg.iter().enumerate() {
             let (sine, cosine) = libm::sincos(degrees.to_radians());
-            *slope = (sine / cosine, cosine);
+            (elevations[0][layer], elevations[1][layer]) = (sine as f32, cosine as f32);
+            self.slopes[layer] = (sine / cosine, cosine);
         }
         let (mut sine, mut cosine) = libm::sincos(self.start_rad);
         let (step_sine, step_cosine) = libm::sincos(self.step_rad);
-        for column in 0..self.columns {
-            let (sine_f32, cosine_f32) = (sine as f32, cosine as f32);
-            self.directions[column] = [sine_f32, cosine_f32];
-            for (layer, (sine_v, cosine_v)) in elevation.iter().enumerate() {
-                let point = self.index(column, layer);
-                let range_m = self.range_m[point].max(0.0);
-                let horizontal_m = range_m * cosine_v;
-                self.x_m[point] = horizontal_m * sine_f32;
-                self.y_m[point] = horizontal_m * cosine_f32;
-                self.z_m[point] = range_m * sine_v;
-            }
+        for direction in &mut self.directions[..self.columns] {
+            *direction = [sine as f32, cosine as f32];
             (sine, cosine) = (
                 sine * step_cosine + cosine * step_sine,
                 cosine * step_cosine - sine * step_sine,
             );
         }
+        let coordinates = Coordinates {
+            x_m: self.x_m.as_chunks_mut().0,
+            y_m: self.y_m.as_chunks_mut().0,
+            z_m: self.z_m.as_chunks_mut().0,
+        };
+        let ranges_m = &self.range_m.as_chunks().0[..self.columns];
+        passes::place(ranges_m, &elevations, &self.directions, coordinates);
     }
 
     fn mask_vehicle(&mut self, parameters: &CloudParameters) {

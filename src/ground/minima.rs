@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::moments::{Points, moments_near};
 use super::{Plane, passes};
 use crate::cloud::{CAPACITY, MAX_LAYERS, Scan};
 use crate::float::least_of;
@@ -11,7 +12,9 @@ use crate::float::least_of;
 pub(super) struct Minima {
     per_segment: usize,
     segments: Vec<Vec<Minimum>>,
-    points: Vec<(usize, Vector3<f64>)>,
+    /// The slice of each, and its coordinates.
+    slices: Vec<usize>,
+    at_m: [Vec<f32>; 3],
     /// Of all points; infinity where they do not count.
     heights_m: Vec<f32>,
 }
@@ -27,7 +30,8 @@ impl Minima {
         Self {
             per_segment,
             segments: vec![Vec::with_capacity(per_segment); segments],
-            points: Vec::with_capacity(segments * per_segment),
+            slices: Vec::with_capacity(segments * per_segment),
+            at_m: std::array::from_fn(|_| Vec::with_capacity(segments * per_segment)),
             heights_m: Vec::with_capacity(CAPACITY),
         }
     }
@@ -44,30 +48,35 @@ impl Minima {
         for (column, heights_m) in heights_m.iter().enumerate() {
             let slice = slice_of(scan, column, self.segments.len());
             let segment = &mut self.segments[slice];
-            let highest_m = segment
-                .get(self.per_segment - 1)
-                .map_or(f32::INFINITY, |highest| highest.above_m);
+            let mut highest_m = highest_m(segment, self.per_segment);
             if least_of(*heights_m) >= highest_m {
                 continue;
             }
             for (layer, above_m) in heights_m.iter().copied().enumerate() {
-                if above_m < f32::INFINITY {
+                if above_m < highest_m {
                     let point = scan.index(column, layer) as u32;
                     insert(segment, self.per_segment, Minimum { above_m, point });
+                    highest_m = self::highest_m(segment, self.per_segment);
                 }
             }
         }
-        self.points.clear();
-        for (segment, minima) in self.segments.iter().enumerate() {
-            self.points.extend(minima.iter().map(|minimum| {
-                let point = scan.point_m(minimum.point as usize).map(f64::from);
-                (segment, Vector3::from(point))
-            }));
+        self.slices.clear();
+        for metres in &mut self.at_m {
+            metres.clear();
+        }
+        for (slice, minima) in self.segments.iter().enumerate() {
+            for minimum in minima {
+                self.slices.push(slice);
+                let at_m = scan.point_m(minimum.point as usize);
+                for (metres, coordinate) in self.at_m.iter_mut().zip(at_m) {
+                    metres.push(coordinate);
+                }
+            }
         }
     }
 
     pub(super) fn len(&self) -> usize {
-        self.points.len()
+        self.slices.len()
     }
 
     /// How many slices there are.
@@ -77,18 +86,19 @@ impl Minima {
 
     /// A return by its number, with the slice it lies in.
     pub(super) fn get(&self, number: usize) -> (usize, Vector3<f64>) {
-        self.points[number]
+        let at_m = [0, 1, 2].map(|axis| f64::from(self.at_m[axis][number]));
+        (self.slices[number], at_m.into())
     }
 
-    pub(super) fn points(&self) -> impl Iterator<Item = Vector3<f64>> + Clone {
-        self.points.iter().map(|(_, point)| *point)
+    pub(super) fn points(&self) -> Points<'_> {
+        let [x_m, y_m, z_m] = &self.at_m;
+        Points { x_m, y_m, z_m }
     }
 
     /// How many returns lie within `distance_m` of a plane.
     pub(super) fn support(&self, plane: &Plane, distance_m: f64) -> usize {
-        self.points()
-            .filter(|point| plane.above_m(point).abs() <= distance_m)
-            .count()
+        let moments = moments_near(self.points(), 1, plane, distance_m as f32, f32::INFINITY);
+        moments.count as usize
     }
 }
 
@@ -99,17 +109,15 @@ pub(super) fn slice_of(scan: &Scan, column: usize, segments: usize) -> usize {
     ((part * segments as f64) as usize).min(segments - 1)
 }
 
-/// Keeps the lowest `capacity`, lowest first; of equal ones the first to come.
+/// What is as high as this does not belong to the lowest.
+fn highest_m(minima: &[Minimum], capacity: usize) -> f32 {
+    let highest = minima.get(capacity - 1);
+    highest.map_or(f32::INFINITY, |highest| highest.above_m)
+}
+
+/// Adds one of the lowest `capacity`, lowest first; of equal ones the first to come.
 fn insert(minima: &mut Vec<Minimum>, capacity: usize, minimum: Minimum) {
-    if minima.len() == capacity {
-        if minima
-            .last()
-            .is_none_or(|highest| minimum.above_m >= highest.above_m)
-        {
-            return;
-        }
-        minima.pop();
-    }
+    minima.truncate(capacity - 1);
     let place = minima.partition_point(|kept| kept.above_m <= minimum.above_m);
     minima.insert(place, minimum);
 }

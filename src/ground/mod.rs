@@ -2,10 +2,13 @@
 //!
 //! `minima` gathers the lowest returns of every pie slice, `ransac` finds the plane that most
 //! of them lie on, `plane` has the geometry, `surface` follows the heights above and below that
-//! plane outward into a `profile` for each direction, `passes` is what is done with all points at
+//! plane outward into a `profile` for each direction (`lowest` says where each layer meets it),
+//! `moments` sums over points, `passes` is what is done with all points at
 //! once, and this file follows the plane from revolution to revolution and marks the points.
 
+mod lowest;
 mod minima;
+mod moments;
 mod passes;
 mod plane;
 mod profile;
@@ -14,15 +17,13 @@ mod surface;
 
 pub use plane::Plane;
 
-use nalgebra::Vector3;
-
 use crate::cloud::{CAPACITY, MAX_LAYERS, Scan};
-use crate::marks::marked;
 use crate::parameter::{choices, parameters};
 use crate::random::Random;
 use crate::track::Rectangle;
 use minima::Minima;
-use passes::{Band, Cloud};
+use moments::{Points, moments_near};
+use passes::Band;
 use surface::Surface;
 
 choices! {
@@ -136,10 +137,6 @@ pub struct Ground {
     misses: usize,
     revolutions: u64,
     minima: Minima,
-    /// Returns that the plane is refined with.
-    near: Cloud,
-    /// The lowest returns that lie close to a candidate plane.
-    support: Vec<Vector3<f64>>,
     mask: Vec<bool>,
     surface: Surface,
     heights_m: Vec<f32>,
@@ -168,8 +165,6 @@ impl Ground {
             misses: 0,
             revolutions: 0,
             minima: Minima::new(parameters.segments, parameters.lowest_per_segment),
-            near: Cloud::default(),
-            support: vec![],
             mask: Vec::with_capacity(CAPACITY),
             surface: Surface::new(SECTORS),
             heights_m: Vec::with_capacity(CAPACITY),
@@ -202,13 +197,7 @@ impl Ground {
             .gather(scan, &reference, self.parameters.candidate_range_m);
         let mut random = Random::new(self.parameters.seed as u64 ^ self.revolutions << 20);
         let near = followed.filter(|_| self.misses < self.parameters.follow_patience);
-        let found = ransac::find(
-            &self.minima,
-            near.as_ref(),
-            &self.parameters,
-            &mut random,
-            &mut self.support,
-        );
+        let found = ransac::find(&self.minima, near.as_ref(), &self.parameters, &mut random);
         let found = found.map(|plane| {
             let refined = self.refined(scan, plane);
             let is_plausible = ransac::is_plausible(&refined, near.as_ref(), &self.parameters);
@@ -237,30 +226,21 @@ impl Ground {
         }
     }
 
-    /// The plane fitted to all returns near it, again and again.
-    fn refined(&mut self, scan: &Scan, plane: Plane) -> Plane {
-        /// Refinement moves the plane by less than this many inlier distances.
-        const WIDER: f64 = 3.0;
-        let near_m = self.parameters.inlier_distance_m;
-        self.gather_near(scan, &plane, WIDER * near_m);
+    /// The plane fitted to the returns near it, again and again.
+    fn refined(&self, scan: &Scan, plane: Plane) -> Plane {
+        /// Neighbouring columns meet the same road.
+        const EVERY: usize = 2;
+        let near_m = self.parameters.inlier_distance_m as f32;
+        let far_squared = self.parameters.candidate_range_m.powi(2) as f32;
+        let points = Points {
+            x_m: scan.x_m(),
+            y_m: scan.y_m(),
+            z_m: scan.z_m(),
+        };
         (0..self.parameters.refinements).fold(plane, |plane, _| {
-            let moments = passes::moments_near(&self.near, &plane, near_m);
+            let moments = moments_near(points, EVERY, &plane, near_m, far_squared);
             moments.plane().unwrap_or(plane)
         })
-    }
-
-    /// Notes the returns within a distance of the plane and within the candidates' range.
-    fn gather_near(&mut self, scan: &Scan, plane: &Plane, near_m: f64) {
-        self.near.clear();
-        if self.parameters.refinements == 0 {
-            return;
-        }
-        let far_squared = (self.parameters.candidate_range_m.powi(2)) as f32;
-        self.marks.resize(scan.len(), false);
-        passes::mark_near(scan, plane, near_m as f32, far_squared, &mut self.marks);
-        for point in marked(&self.marks) {
-            self.near.push(scan.point_m(point));
-        }
     }
 
     fn mark(&mut self, scan: &Scan, plane: &Plane, vehicles: &[Rectangle]) -> usize {
@@ -280,7 +260,6 @@ impl Ground {
                 let points = scan.index(columns.start, 0)..scan.index(columns.end, 0);
                 passes::lower(
                     profile,
-                    &scan.range_m()[points.clone()],
                     &self.distances_m[points.clone()],
                     &mut self.heights_m[points],
                 );

@@ -3,7 +3,6 @@
 use multiversion::multiversion;
 
 use super::Plane;
-use super::plane::Moments;
 use super::profile::Profile;
 use crate::cloud::{MAX_LAYERS, Scan};
 
@@ -57,36 +56,31 @@ pub(super) fn distances(scan: &Scan, distances_m: &mut [f32]) {
 /// Points that are looked at together: so many stay in the fastest cache, with what is noted of
 /// them.
 const TOGETHER: usize = 512;
+/// Bends of the ground that they are compared with at once.
+pub(super) const BENDS: usize = 4;
 
-/// Takes the height of the ground off the heights of points in one sector, as far as they have
-/// returns.
+/// Takes the height of the ground off the heights of points in one sector. What has no return,
+/// and therefore no distance, keeps its own.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-pub(super) fn lower(
-    profile: &Profile,
-    ranges_m: &[f32],
-    distances_m: &[f32],
-    heights_m: &mut [f32],
-) {
+pub(super) fn lower(profile: &Profile, distances_m: &[f32], heights_m: &mut [f32]) {
+    let bends = profile.bends();
+    let bends = &bends[..profile.knots().len().next_multiple_of(BENDS)];
+    let mut ground_m = [0.0f32; TOGETHER];
     let mut begin = 0;
-    while begin < ranges_m.len() {
-        let end = (begin + TOGETHER).min(ranges_m.len());
-        let (ranges_m, distances_m) = (&ranges_m[begin..end], &distances_m[begin..end]);
-        let heights_m = &mut heights_m[begin..end];
-        let count = end - begin;
-        let mut behind = [0u32; TOGETHER];
-        let behind = &mut behind[..count];
-        let knots = profile.knots();
-        for knot in &knots[1..] {
-            let from_m = knot.distance_m;
-            for point in 0..count {
-                behind[point] += u32::from(distances_m[point] >= from_m);
+    while begin < distances_m.len() {
+        let end = (begin + TOGETHER).min(distances_m.len());
+        let (distances_m, heights_m) = (&distances_m[begin..end], &mut heights_m[begin..end]);
+        let ground_m = &mut ground_m[..end - begin];
+        ground_m.fill(0.0);
+        for [a, b, c, d] in bends.as_chunks::<BENDS>().0 {
+            for point in 0..end - begin {
+                let distance_m = distances_m[point];
+                ground_m[point] += (a.rise_m(distance_m) + b.rise_m(distance_m))
+                    + (c.rise_m(distance_m) + d.rise_m(distance_m));
             }
         }
-        for point in 0..count {
-            let knot = &knots[behind[point] as usize];
-            let ground_m = knot.level_m + knot.slope * (distances_m[point] - knot.distance_m);
-            let is_return = ranges_m[point] > 0.0;
-            heights_m[point] -= if is_return { ground_m } else { 0.0 };
+        for point in 0..end - begin {
+            heights_m[point] -= ground_m[point];
         }
         begin = end;
     }
@@ -114,107 +108,6 @@ pub(super) fn mark(scan: &Scan, heights_m: &[f32], band: Band, mask: &mut [bool]
         let is_within = (above_m >= -limit_m) | band.with_below;
         mask[point] = (range_m > 0.0) & (above_m <= limit_m) & is_within;
     }
-}
-
-/// Marks the returns within `near_m` of a plane and no farther than the root of `far_squared`
-/// away.
-#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-pub(super) fn mark_near(
-    scan: &Scan,
-    plane: &Plane,
-    near_m: f32,
-    far_squared: f32,
-    marks: &mut [bool],
-) {
-    let above_m = plane.heights();
-    let count = scan.len();
-    let (x_m, y_m, z_m) = (scan.x_m(), scan.y_m(), scan.z_m());
-    let (x_m, y_m, z_m) = (&x_m[..count], &y_m[..count], &z_m[..count]);
-    let ranges_m = &scan.range_m()[..count];
-    let marks = &mut marks[..count];
-    for point in 0..count {
-        let (x, y, z) = (x_m[point], y_m[point], z_m[point]);
-        marks[point] = (above_m(x, y, z).abs() <= near_m)
-            & (x * x + y * y <= far_squared)
-            & (ranges_m[point] > 0.0);
-    }
-}
-
-/// Points by their coordinates.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Cloud {
-    x_m: Vec<f32>,
-    y_m: Vec<f32>,
-    z_m: Vec<f32>,
-}
-
-impl Cloud {
-    pub(super) fn clear(&mut self) {
-        self.x_m.clear();
-        self.y_m.clear();
-        self.z_m.clear();
-    }
-
-    pub(super) fn push(&mut self, [x, y, z]: [f32; 3]) {
-        self.x_m.push(x);
-        self.y_m.push(y);
-        self.z_m.push(z);
-    }
-}
-
-/// The moments of the points within `near_m` of a plane.
-#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-pub(super) fn moments_near(cloud: &Cloud, plane: &Plane, near_m: f64) -> Moments {
-    let [a, b, c] = plane.normal();
-    let height_m = plane.height_m();
-    let mut moments = Moments::default();
-    let total = cloud.x_m.len();
-    let [mut is_near, mut x, mut y, mut z] = [[0.0; TOGETHER]; 4];
-    let mut begin = 0;
-    while begin < total {
-        let end = (begin + TOGETHER).min(total);
-        let (x_m, y_m) = (&cloud.x_m[begin..end], &cloud.y_m[begin..end]);
-        let z_m = &cloud.z_m[begin..end];
-        for point in 0..end - begin {
-            let (x_m, y_m) = (f64::from(x_m[point]), f64::from(y_m[point]));
-            let z_m = f64::from(z_m[point]);
-            let above_m = a * x_m + b * y_m + c * z_m + height_m;
-            let weight = if above_m.abs() <= near_m { 1.0 } else { 0.0 };
-            is_near[point] = weight;
-            x[point] = weight * x_m;
-            y[point] = weight * y_m;
-            z[point] = weight * z_m;
-        }
-        // What is not near, or not there, adds nothing.
-        for coordinates in [&mut is_near, &mut x, &mut y, &mut z] {
-            coordinates[end - begin..].fill(0.0);
-        }
-        moments.count += dot(&is_near, &is_near);
-        moments.x += dot(&is_near, &x);
-        moments.y += dot(&is_near, &y);
-        moments.z += dot(&is_near, &z);
-        moments.xx += dot(&x, &x);
-        moments.xy += dot(&x, &y);
-        moments.yy += dot(&y, &y);
-        moments.xz += dot(&x, &z);
-        moments.yz += dot(&y, &z);
-        begin = end;
-    }
-    moments
-}
-
-/// The sum of the products of numbers.
-#[inline(always)]
-fn dot(a: &[f64; TOGETHER], b: &[f64; TOGETHER]) -> f64 {
-    const LANES: usize = 8;
-    let mut sums = [0.0; LANES];
-    let (a, b) = (a.as_chunks::<LANES>().0, b.as_chunks::<LANES>().0);
-    for eight in 0..a.len() {
-        for lane in 0..LANES {
-            sums[lane] += a[eight][lane] * b[eight][lane];
-        }
-    }
-    sums.iter().sum()
 }
 
 /// Marks the ground returns that are higher than `least_m`, and `per_m` for each metre of

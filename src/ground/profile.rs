@@ -1,7 +1,9 @@
 //! How high the ground is along one direction.
 
+use super::passes;
 use super::surface::{Ring, STEEPEST};
 use crate::cloud::MAX_LAYERS;
+use crate::float::greatest;
 
 /// Rings closer to each other say nothing of a slope.
 const SHORTEST_RUN_M: f32 = 0.1;
@@ -22,9 +24,30 @@ pub(super) struct Knot {
     pub(super) slope: f32,
 }
 
+/// A change of the ground's slope.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bend {
+    distance_m: f32,
+    slope: f32,
+}
+
+impl Bend {
+    const NONE: Self = Self {
+        distance_m: f32::INFINITY,
+        slope: 0.0,
+    };
+
+    /// How much higher the ground is at a distance than without it.
+    #[inline(always)]
+    pub(super) fn rise_m(self, distance_m: f32) -> f32 {
+        self.slope * greatest(distance_m - self.distance_m, 0.0)
+    }
+}
+
 impl Profile {
-    /// Every layer's ring, the sensor, and the end of what the last one says.
-    const MOST: usize = MAX_LAYERS + 2;
+    /// Every layer's ring, the sensor, and the end of what the last one says; bends are looked at
+    /// in fours.
+    const MOST: usize = (MAX_LAYERS + 2).next_multiple_of(passes::BENDS);
 
     pub(super) const FLAT: Self = Self {
         count: 1,
@@ -38,6 +61,21 @@ impl Profile {
     /// Its knots from the inside out; the first one is below the sensor.
     pub(super) fn knots(&self) -> &[Knot] {
         &self.knots[..self.count]
+    }
+
+    /// Where it bends, and how much: below the sensor it is 0 high, elsewhere the sum of the rises
+    /// behind its bends. Filled up with some that bend nothing.
+    pub(super) fn bends(&self) -> [Bend; Self::MOST] {
+        let mut bends = [Bend::NONE; Self::MOST];
+        let mut slope = 0.0;
+        for (bend, knot) in bends.iter_mut().zip(self.knots()) {
+            *bend = Bend {
+                distance_m: knot.distance_m,
+                slope: knot.slope - slope,
+            };
+            slope = knot.slope;
+        }
+        bends
     }
 
     /// Through the rings that are the ground, from the inside out.
@@ -91,7 +129,7 @@ pub(super) mod tests {
     /// How high the ground is above the plane.
     pub(in crate::ground) fn ground_m(profile: &Profile, distance_m: f32) -> f32 {
         let mut height_m = [0.0];
-        lower(profile, &[distance_m], &[distance_m], &mut height_m);
+        lower(profile, &[distance_m], &mut height_m);
         -height_m[0]
     }
 
@@ -108,8 +146,8 @@ pub(super) mod tests {
             }
             ground_m(&Profile::through(&rings), 28.5)
         };
-        assert_eq!(behind([0.0, 0.0, 0.12]), 0.12);
-        assert_eq!(behind([0.0, 0.0, -0.12]), -0.12);
+        assert!((behind([0.0, 0.0, 0.12]) - 0.12).abs() < 1e-6);
+        assert!((behind([0.0, 0.0, -0.12]) + 0.12).abs() < 1e-6);
         assert!((behind([0.5, 0.95, 1.55]) - 2.15).abs() < 1e-3);
         assert!((behind([-0.5, -0.95, -1.55]) + 2.15).abs() < 1e-3);
     }

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::minima::Minima;
+use super::moments::{moments_near, squared_distances};
 use super::{GroundParameters, Plane, Scoring};
 use crate::random::Random;
 
@@ -11,21 +12,19 @@ use crate::random::Random;
 const DRAWS: usize = 16;
 
 /// The plausible plane with the least error, or `None` if no draw gives a plausible one.
-/// `near` is the plane of the revolution before, if the next one must be close to it; `support`
-/// is a buffer.
+/// `near` is the plane of the revolution before, if the next one must be close to it.
 pub(super) fn find(
     minima: &Minima,
     near: Option<&Plane>,
     parameters: &GroundParameters,
     random: &mut Random,
-    support: &mut Vec<Vector3<f64>>,
 ) -> Option<Plane> {
     if minima.len() < 3 {
         return None;
     }
-    let mut best: Option<(f64, Plane)> = None;
+    let mut best: Option<(f32, Plane)> = None;
     for _ in 0..parameters.iterations {
-        let Some(plane) = candidate(minima, parameters, random, support) else {
+        let Some(plane) = candidate(minima, parameters, random) else {
             continue;
         };
         if !is_plausible(&plane, near, parameters) {
@@ -40,23 +39,16 @@ pub(super) fn find(
 }
 
 /// A plane through three returns, refined by all that lie close to it.
-fn candidate(
-    minima: &Minima,
-    parameters: &GroundParameters,
-    random: &mut Random,
-    support: &mut Vec<Vector3<f64>>,
-) -> Option<Plane> {
+fn candidate(minima: &Minima, parameters: &GroundParameters, random: &mut Random) -> Option<Plane> {
     let [a, b, c] = draw(minima, random)?;
     let drawn = Plane::through(a, b, c)?;
-    let supports =
-        |point: &Vector3<f64>| drawn.above_m(point).abs() <= parameters.inlier_distance_m;
-    support.clear();
-    support.extend(minima.points().filter(supports));
+    let near_m = parameters.inlier_distance_m as f32;
+    let moments = moments_near(minima.points(), 1, &drawn, near_m, f32::INFINITY);
     let needed = (parameters.least_support * minima.len() as f64).max(3.0);
-    if (support.len() as f64) < needed {
+    if moments.count < needed {
         return None;
     }
-    Plane::fit(support.iter().copied())
+    moments.plane()
 }
 
 /// Three returns from slices that are not neighbours of each other.
@@ -89,11 +81,10 @@ pub(super) fn is_plausible(
 }
 
 /// Sum of squared distances to the plane.
-fn error(minima: &Minima, plane: &Plane, parameters: &GroundParameters) -> f64 {
+fn error(minima: &Minima, plane: &Plane, parameters: &GroundParameters) -> f32 {
     let most = match parameters.scoring {
         Scoring::All => f64::INFINITY,
         Scoring::Truncated => parameters.inlier_distance_m * parameters.inlier_distance_m,
     };
-    let squared = |point: Vector3<f64>| plane.above_m(&point) * plane.above_m(&point);
-    minima.points().map(|point| squared(point).min(most)).sum()
+    squared_distances(minima.points(), plane, most as f32)
 }

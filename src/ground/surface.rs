@@ -8,8 +8,7 @@
 
 use std::ops::Range;
 
-use multiversion::multiversion;
-
+use super::lowest::{Lowest, MOST_COLUMNS, NO_LEVEL_M, Points};
 use super::minima::slice_of;
 use super::profile::Profile;
 use crate::cloud::{MAX_LAYERS, Scan};
@@ -25,8 +24,8 @@ pub(super) struct Surface {
     /// Sector of every column.
     sector_of: Vec<u16>,
     profiles: Vec<Profile>,
-    /// Heights and distances of the returns of each layer in one sector.
-    levels: [Vec<(f32, f32)>; MAX_LAYERS],
+    /// The lowest returns of each layer in one sector.
+    lowest: Lowest,
     candidates: Vec<(f32, f32)>,
     /// Vehicles in the sector that is looked at.
     vehicles: Vec<Outline>,
@@ -41,22 +40,12 @@ pub(super) struct Ring {
     pub(super) level_m: f32,
 }
 
-/// Part of a layer's returns in a sector that may lie below the ground: noise and reflections.
-const BELOW: f32 = 0.2;
-/// Fewer returns of a layer in a sector say nothing.
-const FEWEST: usize = 3;
-/// Farther rings are too sparse to follow.
-const FARTHEST_M: f32 = 70.0;
 /// Steepest slope against the plane, and how much it may change: at once, and for each metre.
 /// A summit of 150 m radius changes it by 0.0067 each metre.
 pub(super) const STEEPEST: f32 = 0.15;
 const BEND: f32 = 0.012;
 const BEND_PER_M: f32 = 0.0035;
 const MOST_BEND: f32 = 0.05;
-/// No ground is higher than this above the steepest slope.
-const HIGHEST_M: f32 = 0.5;
-/// A rise from one return to the next above that no road has.
-const STEEP: f32 = 1.0;
 /// How far a level may be off besides.
 const SLACK_M: f32 = 0.06;
 /// Levels this near to the plane are always possible, kerbs among them; farther ones as far
@@ -82,7 +71,7 @@ impl Surface {
             voted: vec![[Ring::default(); MAX_LAYERS]; sectors],
             sector_of: vec![],
             profiles: vec![Profile::FLAT; sectors],
-            levels: Default::default(),
+            lowest: Lowest::new(),
             candidates: vec![],
             vehicles: vec![],
         }
@@ -113,6 +102,7 @@ impl Surface {
             let sector = self.sector_of[first];
             let count = self.sector_of[first..]
                 .iter()
+                .take(MOST_COLUMNS)
                 .take_while(|other| **other == sector)
                 .count();
             self.look_out(scan.azimuth_rad(first + count / 2), vehicles);
@@ -171,90 +161,68 @@ impl Surface {
 
     /// The low level of each layer in the columns of a sector.
     fn measure_sector(&mut self, points: &Points<'_>, columns: Range<usize>, sector: usize) {
-        let scan = points.scan;
-        let (ranges_m, _) = scan.range_m().as_chunks::<MAX_LAYERS>();
-        let (heights_m, _) = points.heights_m.as_chunks::<MAX_LAYERS>();
-        let (distances_m, _) = points.distances_m.as_chunks::<MAX_LAYERS>();
-        for levels in &mut self.levels {
-            levels.clear();
-        }
-        for column in columns {
-            let (heights_m, distances_m) = (&heights_m[column], &distances_m[column]);
-            let (returns, mut low) = low_returns(&ranges_m[column], heights_m, distances_m);
-            while low != 0 {
-                let layer = low.trailing_zeros() as usize;
-                low &= low - 1;
-                let (level_m, distance_m) = (heights_m[layer], distances_m[layer]);
-                // Above the highest return nothing rises.
-                let above = returns >> layer >> 1;
-                let upper = layer + 1 + above.trailing_zeros() as usize;
-                let rises_steeply = above != 0
-                    && heights_m[upper] - level_m > STEEP * (distances_m[upper] - distance_m);
-                if !rises_steeply && !self.is_taken(scan, scan.index(column, layer)) {
-                    self.levels[layer].push((level_m, distance_m));
+        let levels_m = self.lowest.note(points, columns.clone());
+        if !self.vehicles.is_empty() {
+            let first = points.scan.index(columns.start, 0);
+            let noted = levels_m.as_flattened_mut().iter_mut().enumerate();
+            for (place, level_m) in noted.filter(|(_, level_m)| **level_m < NO_LEVEL_M) {
+                if is_taken(&self.vehicles, points.scan, first + place) {
+                    *level_m = NO_LEVEL_M;
                 }
             }
         }
-        for (levels, ring) in self.levels.iter_mut().zip(&mut self.rings[sector]) {
-            if levels.len() < FEWEST {
+        self.lowest.sort();
+        for (layer, ring) in self.rings[sector].iter_mut().enumerate() {
+            let Some(column) = self.lowest.low_column(layer) else {
                 continue;
-            }
-            let low = (levels.len() as f32 * BELOW) as usize;
-            let by_height = |a: &(f32, f32), b: &(f32, f32)| a.0.total_cmp(&b.0);
-            let (_, (level_m, distance_m), _) = levels.select_nth_unstable_by(low, by_height);
+            };
+            let point = points.scan.index(columns.start + column, layer);
+            let level_m = points.heights_m[point];
             // A sweep that overlaps itself comes here twice.
-            if ring.distance_m == 0.0 || *level_m < ring.level_m {
+            if ring.distance_m == 0.0 || level_m < ring.level_m {
                 *ring = Ring {
-                    distance_m: *distance_m,
-                    level_m: *level_m,
+                    distance_m: points.distances_m[point],
+                    level_m,
                 };
             }
         }
-    }
-
-    /// Whether a vehicle of the sector stands there.
-    fn is_taken(&self, scan: &Scan, point: usize) -> bool {
-        if self.vehicles.is_empty() {
-            return false;
-        }
-        let [x, y, _] = scan.point_m(point).map(f64::from);
-        self.vehicles.iter().any(|vehicle| {
-            let distance_m = vehicle.distance_within_m([x, y], AROUND_VEHICLES_M);
-            distance_m.is_some_and(|distance_m| distance_m < AROUND_VEHICLES_M)
-        })
     }
 
     /// The median of neighbouring sectors' levels, layer by layer.
     fn vote(&mut self) {
-        let sectors = self.sectors;
-        for sector in 0..sectors {
-            for layer in 0..MAX_LAYERS {
-                let own = self.rings[sector][layer];
-                let mut levels = [0.0f32; 2 * VOTERS + 1];
-                let mut count = 0;
-                let mut distance_m = 0.0;
-                for step in 0..=2 * VOTERS {
-                    let neighbour = (sector + sectors + step - VOTERS) % sectors;
-                    let ring = self.rings[neighbour][layer];
-                    let is_alike = own.distance_m == 0.0
-                        || (ring.distance_m - own.distance_m).abs() < 0.35 * own.distance_m;
-                    if ring.distance_m > 0.0 && is_alike {
-                        levels[count] = ring.level_m;
-                        distance_m += ring.distance_m;
-                        count += 1;
-                    }
-                }
-                self.voted[sector][layer] = if count < FEWEST_VOTES && own.distance_m == 0.0 {
-                    Ring::default()
-                } else {
-                    let levels = &mut levels[..count];
-                    let (_, level_m, _) = levels.select_nth_unstable_by(count / 2, f32::total_cmp);
-                    Ring {
-                        distance_m: distance_m / count as f32,
-                        level_m: *level_m,
-                    }
-                };
+        for layer in 0..MAX_LAYERS {
+            let is_known = self.rings.iter().any(|rings| rings[layer].distance_m > 0.0);
+            for sector in 0..self.sectors {
+                let ring = is_known.then(|| self.voted(sector, layer));
+                self.voted[sector][layer] = ring.unwrap_or_default();
             }
+        }
+    }
+
+    fn voted(&self, sector: usize, layer: usize) -> Ring {
+        let own = self.rings[sector][layer];
+        let mut levels = [0.0f32; 2 * VOTERS + 1];
+        let mut count = 0;
+        let mut distance_m = 0.0;
+        for step in 0..=2 * VOTERS {
+            let neighbour = (sector + self.sectors + step - VOTERS) % self.sectors;
+            let ring = self.rings[neighbour][layer];
+            let is_alike = own.distance_m == 0.0
+                || (ring.distance_m - own.distance_m).abs() < 0.35 * own.distance_m;
+            if ring.distance_m > 0.0 && is_alike {
+                levels[count] = ring.level_m;
+                distance_m += ring.distance_m;
+                count += 1;
+            }
+        }
+        if count == 0 || count < FEWEST_VOTES && own.distance_m == 0.0 {
+            return Ring::default();
+        }
+        let levels = &mut levels[..count];
+        levels.sort_unstable_by(f32::total_cmp);
+        Ring {
+            distance_m: distance_m / count as f32,
+            level_m: levels[count / 2],
         }
     }
 
@@ -269,31 +237,13 @@ impl Surface {
     }
 }
 
-/// The points of a revolution.
-struct Points<'a> {
-    scan: &'a Scan,
-    /// Above the plane.
-    heights_m: &'a [f32],
-    distances_m: &'a [f32],
-}
-
-/// The layers of a column that have a return, and those whose return is near and low enough to
-/// be the ground, a bit for each.
-#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-fn low_returns(
-    ranges_m: &[f32; MAX_LAYERS],
-    heights_m: &[f32; MAX_LAYERS],
-    distances_m: &[f32; MAX_LAYERS],
-) -> (u32, u32) {
-    let (mut returns, mut low) = (0, 0);
-    for layer in 0..MAX_LAYERS {
-        let is_return = ranges_m[layer] > 0.0;
-        let is_low = (distances_m[layer] < FARTHEST_M)
-            & (heights_m[layer] < HIGHEST_M + STEEPEST * distances_m[layer]);
-        returns |= u32::from(is_return) << layer;
-        low |= u32::from(is_return & is_low) << layer;
-    }
-    (returns, low)
+/// Whether a vehicle stands where a point is.
+fn is_taken(vehicles: &[Outline], scan: &Scan, point: usize) -> bool {
+    let [x, y, _] = scan.point_m(point).map(f64::from);
+    vehicles.iter().any(|vehicle| {
+        let distance_m = vehicle.distance_within_m([x, y], AROUND_VEHICLES_M);
+        distance_m.is_some_and(|distance_m| distance_m < AROUND_VEHICLES_M)
+    })
 }
 
 /// Keeps the rings that can be one ground, from the inside out, and forgets the others.
