@@ -57,6 +57,9 @@ pub mod tally;
 mod float;
 mod marks;
 
+// What belongs together, found by joining.
+mod partition;
+
 // Integer microseconds.
 pub mod time;
 

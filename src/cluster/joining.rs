@@ -1,12 +1,12 @@
 //! Which core points belong together.
 
 use super::ClusterParameters;
-use super::partition::Partition;
 use super::row::{self, Row};
 use super::runs::{Run, Runs};
 use super::window::{Cone, Windows};
 use crate::cloud::{MAX_COLUMNS, MAX_LAYERS};
 use crate::marks::marked;
+use crate::partition::Partition;
 
 /// Joins core points that are neighbours. Its buffers are made once.
 #[derive(Debug, Clone)]

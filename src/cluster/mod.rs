@@ -3,13 +3,11 @@
 //! DBSCAN (Ester et al. 1996) without a tree: the array is sorted by azimuth and elevation
 //! already, so that the neighbours of a point stand in a few short stretches of its rows.
 //! `window` says in which, `row` compares points along a layer, `dbscan` is the algorithm,
-//! `joining` says which core points belong together, by way of `runs`, in a `partition`.
+//! `joining` says which core points belong together, by way of `runs`.
 
 mod dbscan;
 
 mod joining;
-
-mod partition;
 
 mod row;
 

@@ -117,10 +117,9 @@ pub(super) fn squared_distances(points: Points<'_>, plane: &Plane, most: f32) ->
             squared[point] = least(above_m * above_m, most);
         }
         squared[end - begin..].fill(0.0);
-        let columns = squared.as_chunks::<LANES>().0;
-        for column in 0..columns.len() {
+        for column in squared.as_chunks::<LANES>().0 {
             for lane in 0..LANES {
-                sums[lane] += columns[column][lane];
+                sums[lane] += column[lane];
             }
         }
         begin = end;

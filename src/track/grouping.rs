@@ -2,26 +2,30 @@
 
 use nalgebra::Vector2;
 
+use super::forecast::{Forecast, Forecasts};
 use super::look::Look;
+use super::patches::{Patch, Placer};
 use super::rectangle::Extent;
 use super::road_user::Track;
-use super::spots::{Patch, Placer, Spot};
-use super::{Outline, Rectangle, Scene, TrackParameters};
-use crate::cloud::{MAX_LAYERS, Scan};
+use super::spots::Spot;
+use super::strays::Strays;
+use super::{Scene, TrackParameters};
 use crate::cluster::Clusters;
 
 /// The groups of a revolution.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Grouping {
     placer: Placer,
+    strays: Strays,
     spots: Vec<Spot>,
     /// Where the spots of each group begin, and the spots, while they are sorted.
     begins: Vec<usize>,
     sorted: Vec<Spot>,
-    patches: Vec<Patch>,
     groups: Vec<Group>,
+    /// The groups before some were joined.
+    former: Vec<Group>,
     /// Where the tracks are expected, and which of them may be in a patch.
-    forecasts: Vec<Forecast>,
+    forecasts: Forecasts,
     near: Vec<usize>,
     /// The bounds of each group, and the one that it joins.
     boxes: Vec<[Vector2<f64>; 2]>,
@@ -33,6 +37,7 @@ pub(super) struct Grouping {
 /// Returns that may be one object: a stretch of the spots.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Group {
+    number: u32,
     begin: usize,
     end: usize,
     pub(super) look: Look,
@@ -40,27 +45,8 @@ pub(super) struct Group {
     pub(super) claimed_by: Option<usize>,
 }
 
-/// Where a track is expected.
-#[derive(Debug, Clone)]
-struct Forecast {
-    rectangle: Rectangle,
-    outline: Outline,
-    reach_m: f64,
-    margin_m: f64,
-    most_m: [f64; 2],
-    yaw_rad: f64,
-}
-
-/// Heights above the ground and distance from a known box at which a return of no cluster may be
-/// the object's.
-const STRAY_LOW_M: f64 = 0.25;
-const STRAY_ABOVE_M: f64 = 0.3;
-const STRAY_M: f64 = 0.4;
-/// Group number of spots that belong to no group.
-const NOBODY: u32 = u32::MAX;
-/// Around the box of a track its returns may lie this far out, and farther where it is unsure.
-const LEAST_MARGIN_M: f64 = 0.25;
-const MOST_MARGIN_M: f64 = 0.9;
+/// In structure only what is well within the box of a track may be its own.
+const STRUCTURE_MARGIN_M: f64 = 0.15;
 /// Two free groups this close may be pieces of one vehicle.
 const GAP_M: f64 = 0.45;
 const LONGEST_JOINED_M: f64 = 5.4;
@@ -68,6 +54,7 @@ const LONGEST_JOINED_M: f64 = 5.4;
 const LEAST_CLAIM: f64 = 0.3;
 /// Fewer returns are noise.
 const FEWEST_RETURNS: usize = 3;
+
 impl Grouping {
     /// Forms the groups anew, given tracks that were carried on to this revolution.
     pub(super) fn form(
@@ -77,15 +64,10 @@ impl Grouping {
         scene: &Scene<'_>,
         parameters: &TrackParameters,
     ) {
-        self.placer.place(
-            clusters,
-            scene,
-            parameters,
-            &mut self.spots,
-            &mut self.patches,
-        );
-        self.divide(tracks, parameters, scene.scan);
-        self.add_strays(tracks, clusters, scene);
+        self.placer.place(clusters, scene, parameters);
+        self.divide(tracks, scene, parameters);
+        self.strays.add(tracks, clusters, scene, &mut self.spots);
+        self.groups.clear();
         self.gather(tracks, scene);
         self.join_pieces(tracks, scene);
     }
@@ -101,154 +83,108 @@ impl Grouping {
 
     /// Whether a group was cut off structure.
     pub(super) fn is_suspect(&self, group: &Group) -> bool {
-        let number = self.spots[group.begin].group;
-        self.suspects.binary_search(&number).is_ok()
+        self.suspects.binary_search(&group.number).is_ok()
     }
 
-    fn forecast(&mut self, tracks: &[Track]) {
-        let forecast = |track: &Track| {
-            let rectangle = track.rectangle();
-            let margin_m = (LEAST_MARGIN_M + track.spread_m()).min(MOST_MARGIN_M);
-            let reach_m = 0.5 * libm::hypot(rectangle.length_m, rectangle.width_m) + margin_m;
-            Forecast {
-                rectangle,
-                outline: rectangle.outline(),
-                reach_m,
-                margin_m,
-                most_m: track.most_m(),
-                yaw_rad: track.yaw_rad(),
-            }
-        };
-        self.forecasts.clear();
-        self.forecasts.extend(tracks.iter().map(forecast));
-    }
-
-    /// Gives every spot a group: the track in whose place it lies, or its own cluster.
-    fn divide(&mut self, tracks: &[Track], parameters: &TrackParameters, scan: &Scan) {
-        self.forecast(tracks);
-        let (forecasts, near) = (&self.forecasts, &mut self.near);
-        let count = tracks.len();
+    /// Gives every return a group: the track in whose place it lies, or its own patch, if that
+    /// can be a road user.
+    fn divide(&mut self, tracks: &[Track], scene: &Scene<'_>, parameters: &TrackParameters) {
+        let origin_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
+        self.forecasts.take(tracks, origin_m);
         self.suspects.clear();
-        for (number, patch) in self.patches.iter().enumerate() {
+        self.spots.clear();
+        for (number, patch) in self.placer.patches().iter().enumerate() {
+            let own = (tracks.len() + number) as u32;
             if patch.is_suspect {
-                self.suspects.push((count + number) as u32);
+                self.suspects.push(own);
             }
-            let own = (count + number) as u32;
-            let spots = &mut self.spots[patch.begin..patch.end];
             let is_whole = patch.can_be_road_user(parameters);
-            near.clear();
-            near.extend((0..count).filter(|track| is_near(&forecasts[*track], patch)));
-            let unclaimed = if is_whole { own } else { NOBODY };
-            let mut claims = 0u32;
-            let mut only = None;
-            let mut several = false;
-            for spot in spots.iter_mut() {
-                spot.group = unclaimed;
-                let nearest = near
-                    .iter()
-                    .filter_map(|track| {
-                        let forecast = &forecasts[*track];
-                        // In structure only what is well within may be its own.
-                        let margin_m = if is_whole { forecast.margin_m } else { 0.15 };
-                        let at_m = spot.at_m.into();
-                        let distance_m = forecast.outline.distance_within_m(at_m, margin_m)?;
-                        Some((distance_m, *track))
-                    })
-                    .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                if let Some((_, track)) = nearest {
-                    spot.group = track as u32;
-                    claims += 1;
-                    several |= only.is_some_and(|only| only != track);
-                    only = Some(track);
+            self.near.clear();
+            self.near.extend(self.forecasts.near(patch));
+            if self.near.is_empty() && !is_whole {
+                continue;
+            }
+            let begin = self.spots.len();
+            let mut claims = Claims::default();
+            let all = self.holds_all(patch, origin_m, is_whole);
+            for placed in self.placer.placed(patch) {
+                let at_m = origin_m + Vector2::from(placed.at_m).map(f64::from);
+                let track = all.or_else(|| self.nearest(at_m, is_whole));
+                claims.note(track);
+                if let Some(group) = track.map(|track| track as u32).or(is_whole.then_some(own)) {
+                    self.spots.push(Spot::new(scene, placed.point, at_m, group));
                 }
             }
+            let spots = &mut self.spots[begin..];
             // A part that reaches out of the only box belongs to it as long as the whole can be
             // one object.
-            if let (Some(track), false, true) = (only, several, is_whole) {
-                let forecast = &forecasts[track];
-                let share = f64::from(claims) / spots.len() as f64;
-                if share > LEAST_CLAIM && fits(spots, forecast) {
+            if let (Some(track), true) = (claims.only(), is_whole) {
+                let share = f64::from(claims.count) / spots.len() as f64;
+                if share > LEAST_CLAIM && fits(spots, self.forecasts.of(track)) {
                     for spot in spots.iter_mut() {
                         spot.group = track as u32;
                     }
                 }
             }
+            align_seam(spots, tracks, scene.scan.duration_s());
         }
-        self.align_seam(tracks, scan);
     }
 
-    /// Adds returns of no cluster to the known objects in whose places they lie: far away too few
-    /// meet a cyclist to be a cluster.
-    fn add_strays(&mut self, tracks: &[Track], clusters: &Clusters, scene: &Scene<'_>) {
-        let Scene { scan, sweep, .. } = *scene;
-        let placement = sweep.sensor.placement();
-        for (number, track) in tracks.iter().enumerate() {
-            if !track.is_confirmed() || !track.is_sparse() {
-                continue;
-            }
-            let place = track.rectangle();
-            let outline = place.outline();
-            let corners = place.corners().map(|corner| placement.sensor_m(corner));
-            let Some((first, count)) = scan.columns_across(&corners) else {
-                continue;
+    /// The only track that is near a patch, if all of the patch lies in its place, as the corners
+    /// of a box say.
+    fn holds_all(&self, patch: &Patch, origin_m: Vector2<f64>, is_whole: bool) -> Option<usize> {
+        let [only] = self.near[..] else { return None };
+        let [[west, south], [east, north]] = [patch.low_m, patch.high_m];
+        let corners = [[west, south], [west, north], [east, south], [east, north]];
+        let is_within = |corner: [f32; 2]| {
+            let at_m = origin_m + Vector2::from(corner).map(f64::from);
+            self.nearest(at_m, is_whole).is_some()
+        };
+        corners.into_iter().all(is_within).then_some(only)
+    }
+
+    /// The nearest of the tracks that are near a patch, if it can have a return there.
+    fn nearest(&self, at_m: Vector2<f64>, is_whole: bool) -> Option<usize> {
+        let distances = self.near.iter().filter_map(|track| {
+            let Forecast {
+                outline, margin_m, ..
+            } = self.forecasts.of(*track);
+            let margin_m = if is_whole {
+                *margin_m
+            } else {
+                STRUCTURE_MARGIN_M
             };
-            let heights_m = STRAY_LOW_M..track.height_m() + STRAY_ABOVE_M;
-            for column in (first..first + count).map(|column| column % scan.columns()) {
-                for layer in 0..MAX_LAYERS {
-                    let point = scan.index(column, layer);
-                    let above_m = f64::from(scene.heights_m[point]);
-                    if clusters.labels()[point] != Clusters::NONE
-                        || !scan.has_return(point)
-                        || !heights_m.contains(&above_m)
-                    {
-                        continue;
-                    }
-                    let [x, y, _] = scan.point_m(point).map(f64::from);
-                    let at_m = scene.placements[column].local_m([x, y]);
-                    if outline.distance_m(at_m) < STRAY_M {
-                        self.spots.push(Spot {
-                            at_m: Vector2::from(at_m),
-                            above_m,
-                            age_s: scan.age_s(column),
-                            point: point as u32,
-                            group: number as u32,
-                        });
-                    }
-                }
-            }
-        }
+            let distance_m = outline.distance_within_m(at_m.into(), margin_m)?;
+            Some((distance_m, *track))
+        });
+        let nearest = distances.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        nearest.map(|(_, track)| track)
     }
 
-    /// What moves is seen twice at the seam of the sweep, a revolution apart: brings the older
-    /// part of a known object to the time of the newer.
-    fn align_seam(&mut self, tracks: &[Track], scan: &Scan) {
-        let duration_s = scan.duration_s();
-        for patch in self.patches.iter().filter(|patch| patch.over_seam) {
-            for spot in &mut self.spots[patch.begin..patch.end] {
-                let is_old = spot.age_s > 0.5 * duration_s;
-                if let (Some(track), true) = (tracks.get(spot.group as usize), is_old) {
-                    spot.at_m += track.velocity_mps() * duration_s;
-                    spot.age_s -= duration_s;
-                }
-            }
-        }
-    }
-
-    /// Puts the spots of every group side by side and looks at it.
+    /// Puts the spots of every group side by side and looks at it, unless it is as it was.
     fn gather(&mut self, tracks: &[Track], scene: &Scene<'_>) {
         let sensor_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
-        self.sort_spots(tracks.len() + self.patches.len());
+        self.sort_spots(tracks.len() + self.placer.patches().len());
+        std::mem::swap(&mut self.groups, &mut self.former);
         self.groups.clear();
+        let mut former = self.former.iter().peekable();
         let mut begin = 0;
         for spots in self.spots.chunk_by(|a, b| a.group == b.group) {
             let end = begin + spots.len();
-            let number = spots[0].group as usize;
-            let claimed_by = (number < tracks.len()).then_some(number);
+            let number = spots[0].group;
+            let claimed_by = Some(number as usize).filter(|number| *number < tracks.len());
             if spots.len() >= FEWEST_RETURNS || claimed_by.is_some() {
+                while former.next_if(|group| group.number < number).is_some() {}
+                // Groups lose all of their spots or none.
+                let same = former.next_if(|group| {
+                    group.number == number && group.end - group.begin == spots.len()
+                });
                 self.groups.push(Group {
+                    number,
                     begin,
                     end,
-                    look: Look::at(spots, scene.scan, sensor_m),
+                    look: same
+                        .map_or_else(|| Look::at(spots, scene.scan, sensor_m), |group| group.look),
                     claimed_by,
                 });
             }
@@ -256,23 +192,19 @@ impl Grouping {
         }
     }
 
-    /// Sorts spots by their groups, which are numbered below a bound, and drops those of nobody.
+    /// Sorts spots by their groups, which are numbered below a bound.
     fn sort_spots(&mut self, bound: usize) {
         self.begins.clear();
         self.begins.resize(bound + 1, 0);
-        let owned = || self.spots.iter().filter(|spot| spot.group != NOBODY);
-        for spot in owned() {
+        for spot in &self.spots {
             self.begins[spot.group as usize + 1] += 1;
         }
         for group in 1..=bound {
             self.begins[group] += self.begins[group - 1];
         }
-        let total = self.begins[bound];
         self.sorted.clear();
-        if let Some(any) = self.spots.first() {
-            self.sorted.resize(total, *any);
-        }
-        for spot in owned() {
+        self.sorted.extend_from_slice(&self.spots);
+        for spot in &self.spots {
             let at = &mut self.begins[spot.group as usize];
             self.sorted[*at] = *spot;
             *at += 1;
@@ -319,7 +251,7 @@ impl Grouping {
         }
         for (number, group) in self.groups.iter().enumerate() {
             if target[number] != number {
-                let to = self.spots[self.groups[target[number]].begin].group;
+                let to = self.groups[target[number]].number;
                 for spot in &mut self.spots[group.begin..group.end] {
                     spot.group = to;
                 }
@@ -376,14 +308,47 @@ impl Grouping {
     }
 }
 
-/// Whether a track's box can hold any of a patch.
-fn is_near(forecast: &Forecast, patch: &Patch) -> bool {
-    let [x, y] = forecast.rectangle.centre_m;
-    let reach_m = forecast.reach_m;
-    patch.low_m.x - reach_m <= x
-        && x <= patch.high_m.x + reach_m
-        && patch.low_m.y - reach_m <= y
-        && y <= patch.high_m.y + reach_m
+/// The tracks in whose places the returns of a patch were found.
+#[derive(Default)]
+struct Claims {
+    count: u32,
+    last: Option<usize>,
+    are_several: bool,
+}
+
+impl Claims {
+    fn note(&mut self, track: Option<usize>) {
+        if track.is_some() {
+            self.count += 1;
+            self.are_several |= self.last.is_some() && self.last != track;
+            self.last = track;
+        }
+    }
+
+    /// The only one, if it is.
+    fn only(&self) -> Option<usize> {
+        self.last.filter(|_| !self.are_several)
+    }
+}
+
+/// What moves is seen twice at the seam of the sweep, a revolution apart: brings the older part
+/// of a known object, of which spots are in the order of the scan, to the time of the newer.
+fn align_seam(spots: &mut [Spot], tracks: &[Track], duration_s: f64) {
+    let (Some(oldest), Some(newest)) = (spots.first(), spots.last()) else {
+        return;
+    };
+    if oldest.age_s - newest.age_s <= 0.5 * duration_s {
+        return;
+    }
+    for spot in spots
+        .iter_mut()
+        .filter(|spot| spot.age_s > 0.5 * duration_s)
+    {
+        if let Some(track) = tracks.get(spot.group as usize) {
+            spot.at_m += track.velocity_mps() * duration_s;
+            spot.age_s -= duration_s;
+        }
+    }
 }
 
 /// Whether spots can all belong to the object that is expected.

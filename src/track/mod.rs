@@ -1,16 +1,21 @@
 //! Step five: clusters become objects that keep their identity from revolution to revolution.
 //!
-//! `objects` takes a revolution in: `spots` places its returns, `grouping` says which belong
-//! together, `assignment` what is whose, `sight` what is hidden and what is gone. A `road_user`
-//! learns from each `look` its `motion`, its `shape`, its `class`, and by its `trail` whether it
-//! moves; `existence` says whether it is there at all; and one that was lost gets its id back
-//! (`road_user`). `nearest` is the tracking of the thesis.
+//! `objects` takes a revolution in: `patches` places its returns and parts what does not touch on
+//! the `floor`, `grouping` says which `spots` belong together, given the `forecast` of each track
+//! and `strays` near it, `assignment` what is whose, `sight` what is hidden and what is gone. A
+//! `road_user` learns from each `look` its `motion`, its `shape`, its `class`, and by its `trail`
+//! whether it moves; `existence` says whether it is there at all; and one that was lost gets its id
+//! back (`road_user`). `nearest` is the tracking of the thesis.
 
 mod assignment;
 
 mod class;
 
 mod existence;
+
+mod floor;
+
+mod forecast;
 
 mod grouping;
 
@@ -22,6 +27,8 @@ mod nearest;
 
 mod objects;
 
+mod patches;
+
 mod rectangle;
 
 mod road_user;
@@ -31,6 +38,8 @@ mod shape;
 mod sight;
 
 mod spots;
+
+mod strays;
 
 mod trail;
 

@@ -4,6 +4,8 @@
 //! The state is Cartesian, so that a first sighting, whose heading nobody knows, is a velocity
 //! of 0 with an honest variance rather than a heading that must be made up.
 
+use std::ops::AddAssign;
+
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 /// x, y, their velocities, and the rate of turn.
@@ -265,39 +267,45 @@ impl Motion {
     pub(super) fn estimate(&self) -> Estimate {
         let total = self.total();
         let state = self.state();
-        let mut covariance = Covariance::zeros();
-        for hypothesis in &self.hypotheses {
-            let apart = hypothesis.state - state;
-            covariance += (hypothesis.covariance + apart * apart.transpose())
-                * (hypothesis.probability / total);
-        }
         Estimate {
             position_m: state.fixed_rows::<2>(0).into(),
             velocity_mps: state.fixed_rows::<2>(2).into(),
             yaw_rate_radps: state[4],
-            position_covariance: covariance.fixed_view::<2, 2>(0, 0).into(),
-            velocity_covariance: covariance.fixed_view::<2, 2>(2, 2).into(),
-            standing: self.standing(),
+            position_covariance: self.spread::<0>(&state, total),
+            velocity_covariance: self.spread::<2>(&state, total),
+            standing: self.hypotheses[0].probability / total,
         }
+    }
+
+    /// Covariance of position or velocity, which are at `AT` in the state that all agree on: what
+    /// each hypothesis says, and how far they are apart.
+    fn spread<const AT: usize>(&self, state: &State, total: f64) -> Matrix2<f64> {
+        let mut covariance = Matrix2::zeros();
+        for hypothesis in &self.hypotheses {
+            let apart = hypothesis.state.fixed_rows::<2>(AT) - state.fixed_rows::<2>(AT);
+            covariance += (hypothesis.covariance.fixed_view::<2, 2>(AT, AT)
+                + apart * apart.transpose())
+                * (hypothesis.probability / total);
+        }
+        covariance
+    }
+
+    /// Covariance of the position.
+    pub(super) fn position_covariance(&self) -> Matrix2<f64> {
+        self.spread::<0>(&self.state(), self.total())
     }
 }
 
 impl Hypothesis {
     fn predict(&mut self, model: Model, seconds: f64) {
-        let mut transition = Covariance::identity();
         match model {
-            Model::Standing => {
-                for at in 2..5 {
-                    transition[(at, at)] = 0.0;
-                }
-                self.state = transition * self.state;
+            Model::Standing => self.stay(),
+            Model::Straight => self.go_straight(seconds),
+            Model::Turning => {
+                let (state, jacobian) = turned(&self.state, seconds);
+                self.state = state;
+                self.covariance = jacobian * self.covariance * jacobian.transpose();
             }
-            Model::Straight => {
-                (transition[(0, 2)], transition[(1, 3)]) = (seconds, seconds);
-                transition[(4, 4)] = 0.0;
-                self.state = transition * self.state;
-            }
-            Model::Turning => (self.state, transition) = turned(&self.state, seconds),
         }
         let (acceleration, turn) = match model {
             Model::Standing => (0.0, 0.0),
@@ -320,7 +328,33 @@ impl Hypothesis {
         if model != Model::Turning {
             noise[(4, 4)] = STRAIGHT_RADPS * STRAIGHT_RADPS;
         }
-        self.covariance = transition * self.covariance * transition.transpose() + noise;
+        self.covariance += noise;
+    }
+
+    /// Keeps only the place.
+    fn stay(&mut self) {
+        let place = self.covariance.fixed_view::<2, 2>(0, 0).into_owned();
+        self.covariance = Covariance::zeros();
+        self.covariance
+            .fixed_view_mut::<2, 2>(0, 0)
+            .copy_from(&place);
+        self.state.fixed_rows_mut::<3>(2).fill(0.0);
+    }
+
+    /// Goes on without a turn: the transition adds ways to places and forgets the rate of turn.
+    fn go_straight(&mut self, seconds: f64) {
+        for (at, speed) in [(0, 2), (1, 3)] {
+            self.state[at] += seconds * self.state[speed];
+            let way = seconds * self.covariance.row(speed);
+            self.covariance.row_mut(at).add_assign(&way);
+        }
+        for (at, speed) in [(0, 2), (1, 3)] {
+            let way = seconds * self.covariance.column(speed);
+            self.covariance.column_mut(at).add_assign(&way);
+        }
+        self.state[4] = 0.0;
+        self.covariance.row_mut(4).fill(0.0);
+        self.covariance.column_mut(4).fill(0.0);
     }
 
     /// Gives the likelihood of the position.

@@ -231,8 +231,10 @@ impl ObjectTracker {
 
     fn publish(&mut self, end: Time, parameters: &TrackParameters) {
         self.objects.clear();
+        let least = parameters.least_confidence;
         let is_due = |track: &Track| {
-            !track.is_published && track.object(end).existence >= parameters.least_confidence
+            let may_be = !track.is_published && track.most_existence() >= least;
+            may_be && track.object(end).existence >= least
         };
         let mut number = 0;
         while number < self.tracks.len() {
@@ -242,9 +244,10 @@ impl ObjectTracker {
             }
             number += 1;
         }
-        let published = self.tracks.iter().filter(|track| track.is_published);
-        let objects = published.map(|track| track.object(end));
-        let listed = objects.filter(|object| object.existence >= parameters.least_confidence);
+        let may_be = |track: &&Track| track.is_published && track.most_existence() >= least;
+        let objects = self.tracks.iter().filter(may_be);
+        let objects = objects.map(|track| track.object(end));
+        let listed = objects.filter(|object| object.existence >= least);
         self.objects.extend(listed);
         self.objects.sort_by_key(|object| object.id);
     }

@@ -51,9 +51,7 @@ impl Sight {
         let stride = count.div_ceil(MOST_COLUMNS).max(1);
         for step in (0..count).step_by(stride) {
             let column = (first + step) % scan.columns();
-            let azimuth_rad = scan.azimuth_rad(column);
-            let (sine, cosine) = libm::sincos(azimuth_rad);
-            let direction = [sine, cosine];
+            let direction = scan.direction(column).map(f64::from);
             let Some(below_belt) = crossing(&corners, direction) else {
                 continue;
             };

@@ -155,8 +155,7 @@ impl Track {
 
     /// How far the object may be from where it is thought to be, one standard deviation.
     pub(super) fn spread_m(&self) -> f64 {
-        let covariance = self.motion.estimate().position_covariance;
-        libm::sqrt(0.5 * covariance.trace())
+        libm::sqrt(0.5 * self.motion.position_covariance().trace())
     }
 
     pub(super) fn velocity_mps(&self) -> Vector2<f64> {

@@ -10,6 +10,11 @@ use crate::track::Object;
 const THERE_M: f64 = 2.0;
 
 impl Track {
+    /// How likely it exists at most, wherever it is: never less than [`Object::existence`].
+    pub(in crate::track) fn most_existence(&self) -> f64 {
+        self.existence.probability() * self.belief.road_user()
+    }
+
     /// What is published, valid at `end`.
     pub(in crate::track) fn object(&self, end: Time) -> Object {
         let (motion, shape) = self.later(end);
@@ -49,7 +54,7 @@ impl Track {
                 .map(|axis| libm::sqrt(estimate.position_covariance[(axis, axis)])),
             yaw_deviation_rad: libm::sqrt(shape.yaw_variance),
             speed_deviation_mps: libm::sqrt(speed_variance),
-            existence: self.existence.probability() * self.belief.road_user() * there,
+            existence: self.most_existence() * there,
             first_seen: self.first_seen,
             seen_since: self.seen_since,
             last_measured: self.last_measured,

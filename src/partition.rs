@@ -2,20 +2,20 @@
 
 /// Sets of numbers below a bound, each with its smallest member as the representative.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Partition {
+pub(crate) struct Partition {
     parent: Vec<u32>,
 }
 
 impl Partition {
     /// Every number below `len` in a set of its own.
-    pub(super) fn reset(&mut self, len: usize) {
+    pub(crate) fn reset(&mut self, len: usize) {
         self.parent.clear();
         self.parent.extend(0..len as u32);
     }
 
     /// Finds the sets of all numbers at once: [`Partition::parents`] are the smallest members, for
     /// now.
-    pub(super) fn flatten(&mut self) {
+    pub(crate) fn flatten(&mut self) {
         for number in 0..self.parent.len() {
             // Parents are smaller, and their own ones are found already.
             self.parent[number] = self.parent[self.parent[number] as usize];
@@ -23,12 +23,12 @@ impl Partition {
     }
 
     /// A member of each number's set: the smallest one that was known at some time.
-    pub(super) fn parents(&self) -> &[u32] {
+    pub(crate) fn parents(&self) -> &[u32] {
         &self.parent
     }
 
     /// The smallest member of a number's set.
-    pub(super) fn find(&mut self, mut number: u32) -> u32 {
+    pub(crate) fn find(&mut self, mut number: u32) -> u32 {
         while self.parent[number as usize] != number {
             let grandparent = self.parent[self.parent[number as usize] as usize];
             self.parent[number as usize] = grandparent;
@@ -38,7 +38,7 @@ impl Partition {
     }
 
     /// Makes one set of two.
-    pub(super) fn join(&mut self, a: u32, b: u32) {
+    pub(crate) fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.find(a), self.find(b));
         self.parent[a.max(b) as usize] = a.min(b);
     }

@@ -1,0 +1,116 @@
+//! What touches, seen from above.
+
+use crate::float::rounded;
+use crate::partition::Partition;
+
+/// Cells of one cluster, seen from above, and which of them touch.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Floor {
+    /// Cells in a metre.
+    per_m: f32,
+    /// The middle of the cell in the south-west.
+    low_m: [f32; 2],
+    /// Cells from south to north, one more than the cluster has on either side.
+    height: u32,
+    /// For every place, one more than the number of the cell in it; 0 where there is none.
+    numbers: Vec<u32>,
+    /// Places of the cells that there are, in the order in which they were added.
+    places: Vec<u32>,
+    /// Cells of one part.
+    partition: Partition,
+}
+
+impl Floor {
+    /// Empties it for a cluster between these corners.
+    pub(super) fn begin(&mut self, low_m: [f32; 2], high_m: [f32; 2], cell_m: f32) {
+        for place in &self.places {
+            self.numbers[*place as usize] = 0;
+        }
+        self.places.clear();
+        self.per_m = 1.0 / cell_m;
+        self.low_m = low_m;
+        let [width, height] = [0, 1].map(|axis| self.cell(high_m, axis) + 2);
+        self.height = height;
+        let size = (width * height) as usize;
+        if self.numbers.len() < size {
+            self.numbers.resize(size, 0);
+        }
+    }
+
+    /// The column or the row of a place between the corners. Those at the edges stay empty.
+    #[inline(always)]
+    fn cell(&self, at_m: [f32; 2], axis: usize) -> u32 {
+        u32::from(rounded((at_m[axis] - self.low_m[axis]) * self.per_m)) + 1
+    }
+
+    /// The number of a place between the corners.
+    #[inline(always)]
+    pub(super) fn place(&self, at_m: [f32; 2]) -> u32 {
+        self.cell(at_m, 0) * self.height + self.cell(at_m, 1)
+    }
+
+    /// Adds the cell at a place, if it is not there yet.
+    #[inline(always)]
+    pub(super) fn add(&mut self, place: u32) {
+        let number = &mut self.numbers[place as usize];
+        if *number == 0 {
+            self.places.push(place);
+            *number = self.places.len() as u32;
+        }
+    }
+
+    /// The number of the cell at a place, if there is one: counted from 0 in the order in which
+    /// they were added.
+    #[inline(always)]
+    pub(super) fn number(&self, place: u32) -> Option<usize> {
+        (self.numbers[place as usize] as usize).checked_sub(1)
+    }
+
+    /// How many cells there are.
+    pub(super) fn len(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Joins the cells that touch, also by their corners.
+    pub(super) fn join(&mut self) {
+        self.partition.reset(self.places.len());
+        for (number, place) in self.places.iter().enumerate() {
+            let east = place + self.height;
+            for neighbour in [place + 1, east - 1, east, east + 1] {
+                if let Some(other) = self.number(neighbour) {
+                    self.partition.join(number as u32, other as u32);
+                }
+            }
+        }
+        self.partition.flatten();
+    }
+
+    /// For each cell the part that it belongs to: the first cell of that.
+    pub(super) fn parts(&self) -> &[u32] {
+        self.partition.parents()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_that_touch_by_a_corner_are_one_part_and_others_are_not() {
+        let mut floor = Floor::default();
+        let at_m = [[2.0, 2.0], [2.3, 2.3], [4.0, 2.0], [2.3, 2.9], [2.0, 2.6]];
+        // What was there before is gone.
+        for cell_m in [0.1, 0.3] {
+            floor.begin([2.0, 2.0], [4.0, 2.9], cell_m);
+            for at_m in at_m {
+                floor.add(floor.place(at_m));
+                floor.add(floor.place(at_m));
+            }
+            floor.join();
+        }
+        assert_eq!(floor.len(), 5);
+        assert_eq!(floor.parts(), [0, 0, 2, 0, 0]);
+        assert_eq!(floor.number(floor.place([2.3, 2.9])), Some(3));
+        assert_eq!(floor.number(floor.place([3.5, 2.0])), None);
+    }
+}

@@ -1,0 +1,103 @@
+//! Returns of no cluster in the places of known objects: far away too few meet a cyclist to be a
+//! cluster.
+
+use std::ops::Range;
+
+use multiversion::multiversion;
+
+use super::Scene;
+use super::road_user::Track;
+use super::spots::Spot;
+use crate::cluster::Clusters;
+use crate::marks::marked;
+
+/// Finds them. Its buffer is made once.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Strays {
+    /// Points that are looked at closer.
+    marks: Vec<bool>,
+}
+
+/// Heights above the ground and distance from a known box at which a return of no cluster may be
+/// the object's.
+const LOW_M: f64 = 0.25;
+const ABOVE_M: f64 = 0.3;
+const NEAR_M: f64 = 0.4;
+
+impl Strays {
+    /// Adds them to the spots of tracks that may be no cluster.
+    pub(super) fn add(
+        &mut self,
+        tracks: &[Track],
+        clusters: &Clusters,
+        scene: &Scene<'_>,
+        spots: &mut Vec<Spot>,
+    ) {
+        let Scene { scan, sweep, .. } = *scene;
+        let placement = sweep.sensor.placement();
+        for (number, track) in tracks.iter().enumerate() {
+            if !track.is_confirmed() || !track.is_sparse() {
+                continue;
+            }
+            let place = track.rectangle();
+            let corners = place.corners().map(|corner| placement.sensor_m(corner));
+            let Some((first, count)) = scan.columns_across(&corners) else {
+                continue;
+            };
+            let outline = place.outline();
+            let heights_m = [LOW_M, track.height_m() + ABOVE_M].map(|metres| metres as f32);
+            let columns = scan.columns();
+            let over = (first + count).saturating_sub(columns);
+            for stretch in [first..first + count - over, 0..over] {
+                let points = scan.index(stretch.start, 0)..scan.index(stretch.end, 0);
+                self.mark(scene, clusters, points.clone(), heights_m);
+                for point in marked(&self.marks).map(|place| points.start + place) {
+                    let [x, y, _] = scan.point_m(point).map(f64::from);
+                    let at_m = scene.placements[scan.column(point)].local_m([x, y]);
+                    if outline.distance_m(at_m) < NEAR_M {
+                        let (point, group) = (point as u32, number as u32);
+                        spots.push(Spot::new(scene, point, at_m.into(), group));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Marks the returns of no cluster between two heights.
+    fn mark(
+        &mut self,
+        scene: &Scene<'_>,
+        clusters: &Clusters,
+        points: Range<usize>,
+        heights_m: [f32; 2],
+    ) {
+        self.marks.clear();
+        self.marks.resize(points.len(), false);
+        mark_strays(
+            &clusters.labels()[points.clone()],
+            &scene.scan.range_m()[points.clone()],
+            &scene.heights_m[points],
+            heights_m,
+            &mut self.marks,
+        );
+    }
+}
+
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn mark_strays(
+    labels: &[i32],
+    ranges_m: &[f32],
+    heights_m: &[f32],
+    [low_m, high_m]: [f32; 2],
+    marks: &mut [bool],
+) {
+    let count = marks.len();
+    let (labels, ranges_m) = (&labels[..count], &ranges_m[..count]);
+    let heights_m = &heights_m[..count];
+    for point in 0..count {
+        marks[point] = (labels[point] == Clusters::NONE)
+            & (ranges_m[point] > 0.0)
+            & (heights_m[point] >= low_m)
+            & (heights_m[point] < high_m);
+    }
+}
