@@ -2,6 +2,7 @@
 
 use super::joining::{Joiner, Points};
 use super::row::{self, Centre, Row};
+use super::turning;
 use super::window::{Cone, Windows};
 use super::{ClusterParameters, Clusters};
 use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, Scan};
@@ -51,7 +52,7 @@ impl Dbscan {
     pub fn process(&mut self, scan: &Scan, ground: &[bool]) -> &Clusters {
         let columns = scan.columns();
         self.windows.prepare(scan);
-        Row::turn(&mut self.rows, scan, ground);
+        turning::turn(scan, ground, &mut self.rows);
         // The few are within any window of an exact search.
         let few = self.windows.clipped(columns);
         for row in &mut self.rows {
@@ -150,20 +151,19 @@ impl Dbscan {
             self.numbers[*set as usize] = number as i32;
         }
         let Clusters { labels, ends, .. } = &mut self.clusters;
-        labels.clear();
-        labels.resize(scan.len(), Clusters::NONE);
         ends.clear();
         ends.resize(self.firsts.len(), 0);
+        labels.clear();
+        labels.resize(scan.len(), Clusters::NONE);
         for (layer, run) in layered() {
             let number = self.numbers[partition.find(run.number) as usize];
             ends[number as usize] += run.points as usize;
-            let run_of = &self.rows[layer].run_of;
-            for column in run
-                .columns
-                .clone()
-                .filter(|column| run_of[*column] == run.number)
-            {
-                labels[scan.index(column, layer)] = number;
+            let (columns, own) = (run.columns.clone(), run.number as u16);
+            let run_of = &self.rows[layer].run_of[columns.clone()];
+            for (column, run) in columns.zip(run_of) {
+                if *run == own {
+                    labels[scan.index(column, layer)] = number;
+                }
             }
         }
     }

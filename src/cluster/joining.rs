@@ -76,8 +76,8 @@ impl Joiner {
         for pair in rows.windows(2) {
             row::mark_meetings(&pair[0], &pair[1], columns, &mut self.column_marks[..]);
             for column in marked(&self.column_marks[..columns]) {
-                self.partition
-                    .join(pair[0].run_of[column], pair[1].run_of[column]);
+                let [a, b] = [0, 1].map(|row: usize| u32::from(pair[row].run_of[column]));
+                self.partition.join(a, b);
             }
         }
     }

@@ -2,7 +2,8 @@
 //!
 //! DBSCAN (Ester et al. 1996) without a tree: the array is sorted by azimuth and elevation
 //! already, so that the neighbours of a point stand in a few short stretches of its rows.
-//! `window` says in which, `row` compares points along a layer, `dbscan` is the algorithm,
+//! `turning` makes those rows, `window` says in which stretches, `row` compares points along a
+//! layer, `dbscan` is the algorithm,
 //! `joining` says which core points belong together, by way of `runs`.
 
 mod dbscan;
@@ -12,6 +13,8 @@ mod joining;
 mod row;
 
 mod runs;
+
+mod turning;
 
 mod window;
 

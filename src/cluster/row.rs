@@ -1,21 +1,21 @@
-//! The array turned: layer by layer, so that what is near along a layer stands side by side.
+//! One layer of the array, in which what is near along it stands side by side.
 
 use std::ops::Range;
 
 use multiversion::multiversion;
 
 use super::ClusterParameters;
-use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, Scan};
+use crate::cloud::MAX_COLUMNS;
 use crate::float::least;
 
 /// The points of a layer that are looked at. The others stand at infinity, where nothing is
 /// their neighbour.
 #[derive(Debug, Clone)]
 pub(super) struct Row {
-    x_m: Box<[f32; MAX_COLUMNS]>,
-    y_m: Box<[f32; MAX_COLUMNS]>,
-    z_m: Box<[f32; MAX_COLUMNS]>,
-    range_m: Box<[f32; MAX_COLUMNS]>,
+    pub(super) x_m: Box<[f32; MAX_COLUMNS]>,
+    pub(super) y_m: Box<[f32; MAX_COLUMNS]>,
+    pub(super) z_m: Box<[f32; MAX_COLUMNS]>,
+    pub(super) range_m: Box<[f32; MAX_COLUMNS]>,
     eps_squared: Box<[f32; MAX_COLUMNS]>,
     /// Neighbours that were counted so far.
     close: Box<[f32; MAX_COLUMNS]>,
@@ -28,7 +28,7 @@ pub(super) struct Row {
     /// Whether the neighbours that were counted do not suffice to call it one.
     pub(super) is_open: Box<[bool; MAX_COLUMNS]>,
     /// Number of the run of each core point, or [`Row::NO_RUN`].
-    pub(super) run_of: Box<[u32; MAX_COLUMNS]>,
+    pub(super) run_of: Box<[u16; MAX_COLUMNS]>,
 }
 
 /// A point with all that its neighbourhood depends on.
@@ -43,14 +43,12 @@ pub(super) struct Centre {
 
 /// Columns to either side in which a point on a surface has enough neighbours.
 const NEXT_FEW: usize = 4;
-/// Columns that are turned at once: so many, of all layers, are in the fastest cache.
-const TURNED: usize = 64;
 /// Columns to either side of a point's own in which its neighbours in the next layer are counted.
 const BESIDE: usize = 1;
 
 impl Row {
     /// The number of no run.
-    pub(super) const NO_RUN: u32 = u32::MAX;
+    pub(super) const NO_RUN: u16 = u16::MAX;
 
     pub(super) fn new() -> Self {
         let zeros = || Box::new([0.0; MAX_COLUMNS]);
@@ -67,40 +65,6 @@ impl Row {
             core: never(),
             is_open: never(),
             run_of: Box::new([0; MAX_COLUMNS]),
-        }
-    }
-
-    /// Takes the returns over that are not ground, layer by layer.
-    pub(super) fn turn(rows: &mut [Self], scan: &Scan, ground: &[bool]) {
-        for begin in (0..scan.columns()).step_by(TURNED) {
-            let columns = begin..scan.columns().min(begin + TURNED);
-            for (layer, row) in rows.iter_mut().enumerate() {
-                row.take(layer, columns.clone(), scan, ground);
-            }
-        }
-    }
-
-    fn take(&mut self, layer: usize, columns: Range<usize>, scan: &Scan, ground: &[bool]) {
-        let [x_m, y_m, z_m, range_m] = [scan.x_m(), scan.y_m(), scan.z_m(), scan.range_m()]
-            .map(|of_points| &of_points.as_chunks::<MAX_LAYERS>().0[columns.clone()]);
-        let ground = &ground.as_chunks::<MAX_LAYERS>().0[columns.clone()];
-        let own = [
-            &mut self.x_m,
-            &mut self.y_m,
-            &mut self.z_m,
-            &mut self.range_m,
-        ];
-        let [own_x, own_y, own_z, own_range] = own.map(|own| &mut own[columns.clone()]);
-        for at in 0..columns.len() {
-            let is_taken = (range_m[at][layer] > 0.0) & !ground[at][layer];
-            own_x[at] = if is_taken {
-                x_m[at][layer]
-            } else {
-                f32::INFINITY
-            };
-            own_y[at] = y_m[at][layer];
-            own_z[at] = z_m[at][layer];
-            own_range[at] = range_m[at][layer];
         }
     }
 

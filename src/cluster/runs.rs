@@ -12,7 +12,7 @@ use crate::marks::marked;
 /// Core points of one layer, each a neighbour of the one before.
 #[derive(Debug, Clone)]
 pub(super) struct Run {
-    /// Counts the runs of all layers.
+    /// Counts the runs of all layers: fewer than half of all points.
     pub(super) number: u32,
     /// From the first to behind the last; points between that are no core points do not count.
     pub(super) columns: Range<usize>,
@@ -55,7 +55,7 @@ impl Run {
             }
         }
         for run in &mut row.run_of[stretch.clone()] {
-            *run = self.number;
+            *run = self.number as u16;
         }
         self.points += stretch.len() as u32;
         self.columns.end = stretch.end;
@@ -71,7 +71,7 @@ pub(super) struct LayerRuns {
     /// The number of the first.
     first: u32,
     /// How many runs begin in or before each column.
-    begun: Box<[u32; MAX_COLUMNS]>,
+    begun: Box<[u16; MAX_COLUMNS]>,
 }
 
 impl LayerRuns {
@@ -136,7 +136,7 @@ impl LayerRuns {
 
     /// Notes for a stretch of columns how many runs begin in or before them.
     fn note_begun(&mut self, stretch: Range<usize>) {
-        let runs = self.runs.len() as u32;
+        let runs = self.runs.len() as u16;
         for begun in &mut self.begun[stretch] {
             *begun = runs;
         }

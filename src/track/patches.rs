@@ -57,9 +57,9 @@ impl Patch {
             is_suspect: false,
         };
         for Placed { at_m, above_m, .. } in &placed[begin..] {
-            for axis in 0..2 {
-                patch.low_m[axis] = least(patch.low_m[axis], at_m[axis]);
-                patch.high_m[axis] = greatest(patch.high_m[axis], at_m[axis]);
+            for (axis, metres) in at_m.iter().enumerate() {
+                patch.low_m[axis] = least(patch.low_m[axis], *metres);
+                patch.high_m[axis] = greatest(patch.high_m[axis], *metres);
             }
             patch.floor_m = least(patch.floor_m, *above_m);
             patch.top_m = greatest(patch.top_m, *above_m);
