@@ -185,15 +185,10 @@ impl Dbscan {
         for (layer, reach) in self.layers(centre) {
             let row = &self.rows[layer];
             for stretch in self.windows.stretches(centre.column, reach, reach) {
-                if row::count(row, stretch.clone(), centre) == 0 {
-                    continue;
-                }
-                for column in stretch.filter(|column| row.core[*column]) {
-                    let other = scan.index(column, layer);
-                    if let Some(distance) = row.squared_distance(column, centre)
-                        && nearest.is_none_or(|best| (distance, other) < best)
-                    {
-                        nearest = Some((distance, other));
+                if let Some((squared, column)) = row::nearest_core(row, stretch, centre) {
+                    let found = (squared, scan.index(column, layer));
+                    if nearest.is_none_or(|best| found < best) {
+                        nearest = Some(found);
                     }
                 }
             }

@@ -6,7 +6,7 @@ use multiversion::multiversion;
 
 use super::ClusterParameters;
 use crate::cloud::MAX_COLUMNS;
-use crate::float::least;
+use crate::float::{least, least_of};
 
 /// The points of a layer that are looked at. The others stand at infinity, where nothing is
 /// their neighbour.
@@ -95,11 +95,6 @@ impl Row {
 
     /// Whether the point in a column is a neighbour of a point.
     pub(super) fn is_neighbour(&self, column: usize, centre: &Centre) -> bool {
-        self.squared_distance(column, centre).is_some()
-    }
-
-    /// Squared distance of the point in a column, if it is a neighbour.
-    pub(super) fn squared_distance(&self, column: usize, centre: &Centre) -> Option<f32> {
         let [x, y, z] = centre.position_m;
         let (dx, dy, dz) = (
             self.x_m[column] - x,
@@ -107,8 +102,7 @@ impl Row {
             self.z_m[column] - z,
         );
         let squared = dx * dx + dy * dy + dz * dz;
-        let eps_squared = least(centre.eps_m * centre.eps_m, self.eps_squared[column]);
-        (squared <= eps_squared).then_some(squared)
+        squared <= least(centre.eps_m * centre.eps_m, self.eps_squared[column])
     }
 }
 
@@ -246,6 +240,45 @@ pub(super) fn count(row: &Row, stretch: Range<usize>, centre: &Centre) -> u32 {
         found += u32::from(near);
     }
     found
+}
+
+/// The core point of a stretch of a layer that is nearest to a point and its neighbour: squared
+/// distance and column; of equally near ones the first.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub(super) fn nearest_core(
+    row: &Row,
+    stretch: Range<usize>,
+    centre: &Centre,
+) -> Option<(f32, usize)> {
+    /// Points that are compared at once.
+    const BLOCK: usize = 32;
+    let [x, y, z] = centre.position_m;
+    let own = centre.eps_m * centre.eps_m;
+    let mut best = (f32::INFINITY, 0);
+    let mut begin = stretch.start;
+    while begin < stretch.end {
+        let end = stretch.end.min(begin + BLOCK);
+        let (x_m, y_m, z_m) = (
+            &row.x_m[begin..end],
+            &row.y_m[begin..end],
+            &row.z_m[begin..end],
+        );
+        let (core, eps_squared) = (&row.core[begin..end], &row.eps_squared[begin..end]);
+        let mut squared = [f32::INFINITY; BLOCK];
+        for at in 0..end - begin {
+            let (dx, dy, dz) = (x_m[at] - x, y_m[at] - y, z_m[at] - z);
+            let distance = dx * dx + dy * dy + dz * dz;
+            let is_near = (distance <= least(own, eps_squared[at])) & core[at];
+            squared[at] = if is_near { distance } else { f32::INFINITY };
+        }
+        let nearest = least_of(squared);
+        if nearest < best.0 {
+            let at = squared.iter().position(|squared| *squared == nearest);
+            best = (nearest, begin + at.unwrap_or(0));
+        }
+        begin = end;
+    }
+    (best.0 < f32::INFINITY).then_some(best)
 }
 
 /// Marks the columns in which core points of a layer and of the one above it are neighbours, where
