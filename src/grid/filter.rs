@@ -55,7 +55,11 @@ fn spread(cells: u16) -> [i16; BLOCK] {
 /// Whether any cell of a block has any bit.
 #[inline(always)]
 fn any(cells: [i16; BLOCK]) -> bool {
-    cells.into_iter().fold(0, |any, cell| any | cell) != 0
+    let mut any = 0;
+    for cell in &cells {
+        any |= cell;
+    }
+    any != 0
 }
 
 /// The set bits, from the lowest on.
@@ -111,7 +115,11 @@ impl Filter {
             let first = row * TILE_CELLS + block * BLOCK;
             let mut before = [0; BLOCK];
             before.copy_from_slice(&tile.log_odds[first..first + BLOCK]);
-            if any(before.map(|log_odds| i16::from(log_odds > 0))) {
+            let mut is_occupied = [0; BLOCK];
+            for cell in 0..BLOCK {
+                is_occupied[cell] = i16::from(before[cell] > 0);
+            }
+            if any(is_occupied) {
                 for cell in set(cells).filter(|cell| before[*cell] > 0) {
                     let place = [f64::from(east) + cell as f64, f64::from(north)];
                     let at_m = [0, 1].map(|axis| sensor_m[axis] + place[axis] * self.cell_m);
@@ -121,12 +129,14 @@ impl Filter {
                     }
                 }
             }
-            let mut passed = [0; BLOCK];
-            for (cell, passed) in passed.iter_mut().enumerate() {
+            let (mut cells_off, mut passed) = ([0; BLOCK], [0; BLOCK]);
+            for cell in 0..BLOCK {
                 let east = east + cell as f32;
-                *passed = rounded((east * east + north * north).sqrt());
+                cells_off[cell] = rounded((east * east + north * north).sqrt());
             }
-            let passed = passed.map(|cells| self.passed[cells as usize % FARTHEST]);
+            for cell in 0..BLOCK {
+                passed[cell] = self.passed[usize::from(cells_off[cell]) % FARTHEST];
+            }
             self.free_block(tile, first, cells, before, passed, view.revolution);
         }
     }
@@ -147,26 +157,34 @@ impl Filter {
         let (mut changed, mut turned) = ([0; BLOCK], [0; BLOCK]);
         for cell in 0..BLOCK {
             let sum = (before[cell] + (passed[cell] & is_passed[cell])).max(self.lowest);
-            let levels = [before[cell], sum].map(level);
-            let signs = levels.map(i16::signum);
-            changed[cell] = levels[0] ^ levels[1];
-            turned[cell] = i16::from(signs[0] != signs[1]);
+            let (old, new) = (level(before[cell]), level(sum));
+            changed[cell] = old ^ new;
+            turned[cell] = i16::from(old.signum() != new.signum());
             is_lowest[cell] = is_passed[cell] & i16::from(sum == self.lowest);
-            is_free[cell] = is_passed[cell] & i16::from(sum <= 0);
+            is_free[cell] = is_passed[cell] & -i16::from(sum <= 0);
             after[cell] = sum;
         }
         tile.log_odds[first..first + BLOCK].copy_from_slice(&after);
-        for (is_free, top) in is_free.into_iter().zip(&mut tile.top[first..]) {
-            *top = if is_free != 0 { 0 } else { *top };
+        let mut top = [0; BLOCK];
+        top.copy_from_slice(&tile.top[first..first + BLOCK]);
+        for cell in 0..BLOCK {
+            top[cell] &= !is_free[cell] as u8;
         }
+        tile.top[first..first + BLOCK].copy_from_slice(&top);
         if any(changed) {
             tile.revision = revolution;
-            tile.change += turned.into_iter().sum::<i16>() as u32;
+            let mut count = 0;
+            for turned in &turned {
+                count += turned;
+            }
+            tile.change += count as u32;
         }
         if any(is_lowest) {
-            for cell in set(cells).filter(|cell| is_lowest[*cell] != 0) {
-                tile.surely_free[first / TILE_CELLS] |= 1 << (first % TILE_CELLS + cell);
+            let mut lowest = 0u64;
+            for cell in 0..BLOCK {
+                lowest |= u64::from(is_lowest[cell] != 0) << cell;
             }
+            tile.surely_free[first / TILE_CELLS] |= lowest << (first % TILE_CELLS);
         }
     }
 

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::map::TILE_CELLS;
+use crate::float::{greatest, least};
 
 /// Cells that rays passed and cells in which rays ended, in a square of tiles. A word of the
 /// planes is a row of a tile. However many rays meet a cell, it has one bit of each plane: a
@@ -76,8 +77,9 @@ impl Window {
         if !(y1 >= 0.0 && y0 < top) {
             return;
         }
-        let (first, last) = (y0.max(0.0) as usize, y1.min(top - 1.0) as usize);
-        let is_inside = x0.min(x1) >= 0.0 && x0.max(x1) < top;
+        let row = |y: f64| (fixed(y) >> FRACTION_BITS) as usize;
+        let (first, last) = (row(greatest(y0, 0.0)), row(least(y1, top - 1.0)));
+        let is_inside = least(x0, x1) >= 0.0 && greatest(x0, x1) < top;
         if is_inside && first == last && y0 >= 0.0 && y1 < top {
             pass_row(self.passed_row(first), fixed(x0), fixed(x1));
             return;
@@ -100,7 +102,7 @@ impl Window {
             } else {
                 pass_row_clipped(self.passed_row(row), enters, leaves);
             }
-            (enters, leaves) = (leaves, leaves.saturating_add(step));
+            (enters, leaves) = (leaves, leaves.wrapping_add(step));
         }
     }
 
@@ -184,8 +186,13 @@ fn odd_below(mut bits: u64) -> u64 {
 /// millionth of a cell.
 const FRACTION_BITS: u32 = 32;
 
+/// A place, or a step from row to row, of less than 2^18 cells. A longer step comes out wrong:
+/// only a way that ends in the next row has one, and its end is known.
 fn fixed(cells: f64) -> i64 {
-    (cells * (1u64 << FRACTION_BITS) as f64) as i64
+    // Around this the last bit of a float counts ones.
+    const ONES: f64 = (3u64 << 51) as f64;
+    let fractions = cells * (1u64 << FRACTION_BITS) as f64 + ONES;
+    fractions.to_bits().wrapping_sub(ONES.to_bits()) as i64
 }
 
 /// Marks the cells of a row from one place to another, both within the row.
