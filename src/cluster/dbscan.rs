@@ -67,6 +67,10 @@ impl Dbscan {
             row::judge(row, columns, &self.parameters);
         }
         self.find_core_points(columns);
+        // From here on only they count.
+        for row in &mut self.rows {
+            row::keep_core(row, columns);
+        }
         let points = Points {
             parameters: &self.parameters,
             windows: &self.windows,
@@ -181,14 +185,21 @@ impl Dbscan {
     }
 
     fn nearest_core_point(&self, scan: &Scan, centre: &Centre) -> Option<usize> {
+        /// Rounding must not lose a point that is as near as the best one.
+        const SLACK: f32 = 1.001;
         let mut nearest: Option<(f32, usize)> = None;
-        for (layer, reach) in self.layers(centre) {
-            let row = &self.rows[layer];
+        let mut cone = Cone::around(centre.range_m, centre.eps_m);
+        for (layer, _) in self.layers(centre) {
+            // What is farther than the best one does not matter.
+            let Some(reach) = self.windows.reach(centre.layer, layer, cone) else {
+                continue;
+            };
             for stretch in self.windows.stretches(centre.column, reach, reach) {
-                if let Some((squared, column)) = row::nearest_core(row, stretch, centre) {
+                if let Some((squared, column)) = row::nearest(&self.rows[layer], stretch, centre) {
                     let found = (squared, scan.index(column, layer));
                     if nearest.is_none_or(|best| found < best) {
                         nearest = Some(found);
+                        cone = Cone::around(centre.range_m, SLACK * squared.sqrt());
                     }
                 }
             }

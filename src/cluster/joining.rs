@@ -142,9 +142,8 @@ fn touch(
         let stretches = points.windows.stretches(column, reach, reach);
         stretches.into_iter().any(|stretch| {
             let start = stretch.start.max(other.columns.start);
-            let mut both = start..stretch.end.min(other.columns.end).max(start);
-            row::count(row, both.clone(), &centre) > 0
-                && both.any(|column| row.core[column] && row.is_neighbour(column, &centre))
+            let both = start..stretch.end.min(other.columns.end).max(start);
+            row::count(row, both, &centre) > 0
         })
     })
 }

@@ -242,14 +242,10 @@ pub(super) fn count(row: &Row, stretch: Range<usize>, centre: &Centre) -> u32 {
     found
 }
 
-/// The core point of a stretch of a layer that is nearest to a point and its neighbour: squared
-/// distance and column; of equally near ones the first.
+/// The point of a stretch of a layer that is nearest to a point and its neighbour: squared distance
+/// and column; of equally near ones the first.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-pub(super) fn nearest_core(
-    row: &Row,
-    stretch: Range<usize>,
-    centre: &Centre,
-) -> Option<(f32, usize)> {
+pub(super) fn nearest(row: &Row, stretch: Range<usize>, centre: &Centre) -> Option<(f32, usize)> {
     /// Points that are compared at once.
     const BLOCK: usize = 32;
     let [x, y, z] = centre.position_m;
@@ -263,12 +259,12 @@ pub(super) fn nearest_core(
             &row.y_m[begin..end],
             &row.z_m[begin..end],
         );
-        let (core, eps_squared) = (&row.core[begin..end], &row.eps_squared[begin..end]);
+        let eps_squared = &row.eps_squared[begin..end];
         let mut squared = [f32::INFINITY; BLOCK];
         for at in 0..end - begin {
             let (dx, dy, dz) = (x_m[at] - x, y_m[at] - y, z_m[at] - z);
             let distance = dx * dx + dy * dy + dz * dz;
-            let is_near = (distance <= least(own, eps_squared[at])) & core[at];
+            let is_near = distance <= least(own, eps_squared[at]);
             squared[at] = if is_near { distance } else { f32::INFINITY };
         }
         let nearest = least_of(squared);
@@ -279,6 +275,16 @@ pub(super) fn nearest_core(
         begin = end;
     }
     (best.0 < f32::INFINITY).then_some(best)
+}
+
+/// Puts all points of a layer at infinity that are no core points.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub(super) fn keep_core(row: &mut Row, columns: usize) {
+    let (x_m, core) = (&mut row.x_m[..columns], &row.core[..columns]);
+    for column in 0..columns {
+        let x = x_m[column];
+        x_m[column] = if core[column] { x } else { f32::INFINITY };
+    }
 }
 
 /// Marks the columns in which core points of a layer and of the one above it are neighbours, where
