@@ -1,6 +1,6 @@
 //! What touches, seen from above.
 
-use crate::float::rounded;
+use crate::float::{least, rounded};
 use crate::partition::Partition;
 
 /// Cells of one cluster, seen from above, and which of them touch.
@@ -19,6 +19,9 @@ pub(super) struct Floor {
     /// Cells of one part.
     partition: Partition,
 }
+
+/// Cells along a side, of which the last one holds all that is farther: more than any cluster has.
+const MOST: f32 = 2047.0;
 
 impl Floor {
     /// Empties it for a cluster between these corners.
@@ -40,7 +43,8 @@ impl Floor {
     /// The column or the row of a place between the corners. Those at the edges stay empty.
     #[inline(always)]
     fn cell(&self, at_m: [f32; 2], axis: usize) -> u32 {
-        u32::from(rounded((at_m[axis] - self.low_m[axis]) * self.per_m)) + 1
+        let cells = (at_m[axis] - self.low_m[axis]) * self.per_m;
+        u32::from(rounded(least(cells, MOST))) + 1
     }
 
     /// The number of a place between the corners.
@@ -112,5 +116,16 @@ mod tests {
         assert_eq!(floor.parts(), [0, 0, 2, 0, 0]);
         assert_eq!(floor.number(floor.place([2.3, 2.9])), Some(3));
         assert_eq!(floor.number(floor.place([3.5, 2.0])), None);
+    }
+
+    #[test]
+    fn what_is_too_far_for_the_floor_falls_into_its_last_cell() {
+        let mut floor = Floor::default();
+        floor.begin([0.0; 2], [1e6, 5.0], 0.3);
+        for at_m in [[1e6, 5.0], [1e5, 5.0], [0.0, 0.0]] {
+            floor.add(floor.place(at_m));
+        }
+        floor.join();
+        assert_eq!(floor.len(), 2);
     }
 }
