@@ -1,6 +1,6 @@
 //! What touches, seen from above.
 
-use crate::float::{least, rounded};
+use crate::float::{greatest, least, rounded};
 use crate::partition::Partition;
 
 /// Cells of one cluster, seen from above, and which of them touch.
@@ -24,14 +24,25 @@ pub(super) struct Floor {
 const MOST: f32 = 2047.0;
 
 impl Floor {
-    /// Empties it for a cluster between these corners.
-    pub(super) fn begin(&mut self, low_m: [f32; 2], high_m: [f32; 2], cell_m: f32) {
+    /// Empties it for a cluster between these corners, which are relative to `origin_m`. The cells
+    /// lie still in the local frame, so that what stands is parted alike again and again.
+    pub(super) fn begin(
+        &mut self,
+        low_m: [f32; 2],
+        high_m: [f32; 2],
+        cell_m: f32,
+        origin_m: [f64; 2],
+    ) {
         for place in &self.places {
             self.numbers[*place as usize] = 0;
         }
         self.places.clear();
         self.per_m = 1.0 / cell_m;
-        self.low_m = low_m;
+        self.low_m = [0, 1].map(|axis| {
+            let side_m = f64::from(cell_m);
+            let cell = libm::floor((origin_m[axis] + f64::from(low_m[axis])) / side_m);
+            ((cell + 0.5) * side_m - origin_m[axis]) as f32
+        });
         let [width, height] = [0, 1].map(|axis| self.cell(high_m, axis) + 2);
         self.height = height;
         let size = (width * height) as usize;
@@ -43,8 +54,8 @@ impl Floor {
     /// The column or the row of a place between the corners. Those at the edges stay empty.
     #[inline(always)]
     fn cell(&self, at_m: [f32; 2], axis: usize) -> u32 {
-        let cells = (at_m[axis] - self.low_m[axis]) * self.per_m;
-        u32::from(rounded(least(cells, MOST))) + 1
+        let cells = (at_m[axis] - self.low_m[axis]) * self.per_m + 1.0;
+        u32::from(rounded(least(greatest(cells, 1.0), MOST)))
     }
 
     /// The number of a place between the corners.
@@ -105,7 +116,7 @@ mod tests {
         let at_m = [[2.0, 2.0], [2.3, 2.3], [4.0, 2.0], [2.3, 2.9], [2.0, 2.6]];
         // What was there before is gone.
         for cell_m in [0.1, 0.3] {
-            floor.begin([2.0, 2.0], [4.0, 2.9], cell_m);
+            floor.begin([2.0, 2.0], [4.0, 2.9], cell_m, [0.0; 2]);
             for at_m in at_m {
                 floor.add(floor.place(at_m));
                 floor.add(floor.place(at_m));
@@ -121,7 +132,7 @@ mod tests {
     #[test]
     fn what_is_too_far_for_the_floor_falls_into_its_last_cell() {
         let mut floor = Floor::default();
-        floor.begin([0.0; 2], [1e6, 5.0], 0.3);
+        floor.begin([0.0; 2], [1e6, 5.0], 0.3, [7.0; 2]);
         for at_m in [[1e6, 5.0], [1e5, 5.0], [0.0, 0.0]] {
             floor.add(floor.place(at_m));
         }

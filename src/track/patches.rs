@@ -85,6 +85,8 @@ impl Patch {
 /// Places returns and divides clusters.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Placer {
+    /// Where the sensor is, in the local frame.
+    origin_m: [f64; 2],
     placed: Vec<Placed>,
     patches: Vec<Patch>,
     floor: Floor,
@@ -149,6 +151,7 @@ impl Placer {
         parameters: &TrackParameters,
     ) {
         let origin_m = scene.sweep.sensor.placement().origin_m();
+        self.origin_m = origin_m;
         self.placed.clear();
         self.patches.clear();
         for points in clusters.iter() {
@@ -196,7 +199,8 @@ impl Placer {
         let range_m = |placed: &Placed| scan.range_m()[placed.point as usize];
         let nearest_m = own.iter().map(range_m).fold(f32::MAX, least);
         let cell_m = CELL_M + CELL_PER_M * greatest(nearest_m - NEAR_M, 0.0);
-        self.floor.begin(whole.low_m, whole.high_m, cell_m);
+        self.floor
+            .begin(whole.low_m, whole.high_m, cell_m, self.origin_m);
         self.places.clear();
         for placed in own {
             let place = self.floor.place(placed.at_m);
