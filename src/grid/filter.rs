@@ -130,12 +130,12 @@ impl Filter {
                 }
             }
             let (mut cells_off, mut passed) = ([0; BLOCK], [0; BLOCK]);
-            for cell in 0..BLOCK {
+            for (cell, off) in cells_off.iter_mut().enumerate() {
                 let east = east + cell as f32;
-                cells_off[cell] = rounded((east * east + north * north).sqrt());
+                *off = rounded((east * east + north * north).sqrt());
             }
-            for cell in 0..BLOCK {
-                passed[cell] = self.passed[usize::from(cells_off[cell]) % FARTHEST];
+            for (passed, off) in passed.iter_mut().zip(cells_off) {
+                *passed = self.passed[usize::from(off) % FARTHEST];
             }
             self.free_block(tile, first, cells, before, passed, view.revolution);
         }
@@ -181,8 +181,8 @@ impl Filter {
         }
         if any(is_lowest) {
             let mut lowest = 0u64;
-            for cell in 0..BLOCK {
-                lowest |= u64::from(is_lowest[cell] != 0) << cell;
+            for (cell, is_lowest) in is_lowest.iter().enumerate() {
+                lowest |= u64::from(*is_lowest != 0) << cell;
             }
             tile.surely_free[first / TILE_CELLS] |= lowest << (first % TILE_CELLS);
         }

@@ -1,10 +1,10 @@
 //! Step three: the ground, and which returns lie on it (thesis section 4.1.1).
 //!
 //! `minima` gathers the lowest returns of every pie slice, `ransac` finds the plane that most
-//! of them lie on, `plane` has the geometry, `surface` follows the heights above and below that
-//! plane outward into a `profile` for each direction (`lowest` says where each layer meets it),
-//! `moments` sums over points, `passes` is what is done with all points at
-//! once, and this file follows the plane from revolution to revolution and marks the points.
+//! of them lie on, `plane` has the geometry, `moments` sums over points for it. `surface` follows
+//! the heights above and below that plane outward into a `profile` for each direction, `lowest`
+//! says where each layer meets it, `passes` is what is done with all points at once, and this file
+//! follows the plane from revolution to revolution and marks the points.
 
 mod lowest;
 mod minima;
@@ -84,7 +84,7 @@ parameters! {
         /// Revolutions in a row without a plausible plane after which it is sought anew,
         /// within the whole range of heights and tilts.
         follow_patience: usize = 10, in 1..=1000, "revolutions";
-        /// How often the plane is fitted again to all returns near it, within the range of the
+        /// How often the plane is fitted again to the returns near it, within the range of the
         /// candidates. The lowest returns lie below the road by their noise and in its hollows;
         /// all of them together lie on it.
         refinements: usize = 3, thesis 0, in 0..=20, "";
