@@ -88,10 +88,10 @@ mod tests {
             let ground: Vec<bool> = (0..scan.len()).map(|point| point % 5 == 0).collect();
             let mut rows: Vec<Row> = (0..MAX_LAYERS).map(|_| Row::new()).collect();
             turn(&scan, &ground, &mut rows);
-            for point in 0..scan.len() {
+            for (point, is_ground) in ground.into_iter().enumerate() {
                 let (column, layer) = (scan.column(point), scan.layer(point));
                 let row = &rows[layer];
-                if scan.has_return(point) && !ground[point] {
+                if scan.has_return(point) && !is_ground {
                     let [x, y, z] = scan.point_m(point);
                     let found = [row.x_m[column], row.y_m[column], row.z_m[column]];
                     assert_eq!(found, [x, y, z]);

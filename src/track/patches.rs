@@ -286,3 +286,79 @@ impl Placer {
         self.placed.truncate(start);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::tests::scan_of;
+    use crate::cluster::{ClusterParameters, Dbscan};
+    use crate::ego::Sweep;
+    use crate::ground::{GroundReport, Origin, Plane};
+    use crate::parameter::Profile;
+
+    /// The patches of what is seen from 1.9 m above the ground.
+    fn patches(distance_cm: impl Fn(usize, usize) -> u16) -> (Placer, Scan) {
+        let scan = scan_of(1800, distance_cm);
+        let heights_m: Vec<f32> = scan.z_m().iter().map(|z| z + 1.9).collect();
+        let mut dbscan = Dbscan::new(&ClusterParameters::profile(Profile::Default));
+        let clusters = dbscan.process(&scan, &vec![false; scan.len()]);
+        let ground = GroundReport {
+            plane: Plane::level(1.9),
+            origin: Origin::Found,
+            candidates: 0,
+            support: 0,
+            points: 0,
+        };
+        let sweep = Sweep::still(0);
+        let mut placements = vec![];
+        sweep.placements(scan.columns(), &mut placements);
+        let scene = Scene {
+            scan: &scan,
+            heights_m: &heights_m,
+            ground: &ground,
+            sweep: &sweep,
+            placements: &placements,
+        };
+        let parameters = TrackParameters::profile(Profile::Default);
+        let mut placer = Placer::default();
+        placer.place(clusters, &scene, &parameters);
+        (placer, scan)
+    }
+
+    #[test]
+    fn what_does_not_touch_from_above_is_parted_though_it_is_one_cluster() {
+        // 10 m away, of which eps is 0.72 m: posts 0.35 m wide and 0.65 m apart.
+        let (placer, scan) = patches(|column, layer| match column {
+            100..110 | 128..138 if (4..10).contains(&layer) => 1000,
+            _ => 0,
+        });
+        let [left, right] = placer.patches() else {
+            panic!("{:?}", placer.patches());
+        };
+        for (patch, columns) in [(left, 100..110), (right, 128..138)] {
+            let own = placer.placed(patch);
+            assert_eq!(own.len(), 60);
+            assert!(own.is_sorted_by_key(|placed| placed.point));
+            let mut of_own = own.iter().map(|placed| scan.column(placed.point as usize));
+            assert!(of_own.all(|column| columns.contains(&column)));
+            assert!(!patch.is_suspect);
+        }
+    }
+
+    #[test]
+    fn a_house_is_structure_and_what_stands_apart_before_it_is_suspect() {
+        let parameters = TrackParameters::profile(Profile::Default);
+        // 15 m away a wall higher than a truck; a person stands 0.78 m before it.
+        let (placer, _) = patches(|column, layer| match column {
+            40..44 if layer < 8 => 1422,
+            10..80 => 1500,
+            _ => 0,
+        });
+        let (people, walls): (Vec<&Patch>, Vec<&Patch>) = placer
+            .patches()
+            .iter()
+            .partition(|patch| patch.can_be_road_user(&parameters));
+        assert_eq!((people.len(), walls.len()), (1, 1), "{people:?} {walls:?}");
+        assert!(people[0].is_suspect && people[0].diagonal_m() < 1.0);
+    }
+}
