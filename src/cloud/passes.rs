@@ -2,29 +2,18 @@
 
 use multiversion::multiversion;
 
+use super::Dialect;
 use super::scan::{MASKED, MAX_LAYERS};
 use crate::float::greatest;
-use crate::wire::point_cloud::ByteOrder;
 
-/// How ranges are read from the distances of a message.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Reading {
-    pub(super) byte_order: ByteOrder,
-    /// Which bits are distance.
-    pub(super) distance_mask: u16,
-    /// Metres per unit.
-    pub(super) unit_m: f32,
-    /// What is nearer or farther is masked.
-    pub(super) minimum_m: f32,
-    pub(super) maximum_m: f32,
-}
-
-/// Reads the ranges of columns of so many layers; the layers above are masked.
+/// Reads the ranges of columns of so many layers. What is not within the two that are kept is
+/// masked, and so are the layers above.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 pub(super) fn read_ranges(
     distances: &[u8],
     layers: usize,
-    reading: Reading,
+    dialect: Dialect,
+    [low_m, high_m]: [f32; 2],
     ranges_m: &mut [[f32; MAX_LAYERS]],
 ) {
     let mut bytes = [[0u8; 2]; MAX_LAYERS];
@@ -37,9 +26,9 @@ pub(super) fn read_ranges(
             bytes[..layers].copy_from_slice(distances);
         }
         for layer in 0..MAX_LAYERS {
-            let units = reading.byte_order.join(bytes[layer]) & reading.distance_mask;
-            let range_m = f32::from(units) * reading.unit_m;
-            let is_kept = (range_m >= reading.minimum_m) & (range_m <= reading.maximum_m);
+            let units = dialect.byte_order.join(bytes[layer]) & dialect.distance_mask;
+            let range_m = f32::from(units) * dialect.unit_m;
+            let is_kept = (range_m >= low_m) & (range_m <= high_m);
             let kept_m = if is_kept { range_m } else { MASKED };
             ranges_m[layer] = if units == 0 { 0.0 } else { kept_m };
         }

@@ -1,8 +1,8 @@
 //! The static array of points that every later step reads.
 
-use super::passes::{self, Coordinates, Reading};
+use super::passes::{self, Coordinates};
 use super::sensor::{self, Sensor};
-use super::{CloudParameters, Dialect, Revolution};
+use super::{CloudParameters, Revolution};
 use crate::ego::wrapped_rad;
 use crate::time::Time;
 use std::f64::consts::TAU;
@@ -75,23 +75,12 @@ impl Scan {
 
     /// Distances to metres; what is out of range is masked.
     fn read_ranges(&mut self, revolution: &Revolution<'_>, parameters: &CloudParameters) {
-        let Dialect {
-            byte_order,
-            distance_mask,
-            unit_m,
-            ..
-        } = revolution.dialect;
-        let reading = Reading {
-            byte_order,
-            distance_mask,
-            unit_m,
-            minimum_m: parameters.minimum_range_m as f32,
-            maximum_m: parameters.maximum_range_m as f32,
-        };
+        let kept_m = [parameters.minimum_range_m, parameters.maximum_range_m];
         passes::read_ranges(
             revolution.cloud.distances,
             usize::from(revolution.cloud.layers),
-            reading,
+            revolution.dialect,
+            kept_m.map(|metres| metres as f32),
             self.range_m.as_chunks_mut().0,
         );
     }

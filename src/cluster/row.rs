@@ -5,7 +5,7 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use super::ClusterParameters;
-use crate::cloud::MAX_COLUMNS;
+use crate::cloud::{CAPACITY, MAX_COLUMNS};
 use crate::float::{least, least_of};
 
 /// The points of a layer that are looked at. The others stand at infinity, where nothing is
@@ -45,6 +45,9 @@ pub(super) struct Centre {
 const NEXT_FEW: usize = 4;
 /// Columns to either side of a point's own in which its neighbours in the next layer are counted.
 const BESIDE: usize = 1;
+
+/// No run of any point has the number of none.
+const _: () = assert!(CAPACITY < Row::NO_RUN as usize);
 
 impl Row {
     /// The number of no run.

@@ -12,7 +12,7 @@ use crate::marks::marked;
 /// Core points of one layer, each a neighbour of the one before.
 #[derive(Debug, Clone)]
 pub(super) struct Run {
-    /// Counts the runs of all layers: fewer than half of all points.
+    /// Counts the runs of all layers. There are no more than points, so that 16 bits hold it.
     pub(super) number: u32,
     /// From the first to behind the last; points between that are no core points do not count.
     pub(super) columns: Range<usize>,

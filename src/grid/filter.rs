@@ -52,7 +52,8 @@ fn spread(cells: u16) -> [i16; BLOCK] {
     spread
 }
 
-/// Whether any cell of a block has any bit.
+/// Whether any cell of a block has any bit. A plain loop, as all others over a block: those become
+/// vectors, folds do not.
 #[inline(always)]
 fn any(cells: [i16; BLOCK]) -> bool {
     let mut any = 0;

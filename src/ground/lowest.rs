@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
+use super::SECTORS;
 use super::surface::STEEPEST;
 use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, Scan};
 use crate::float::{greatest, least};
@@ -30,10 +31,10 @@ pub(super) struct Lowest {
 
 /// The level of what is no ground: above all others.
 pub(super) const NO_LEVEL_M: f32 = f32::MAX;
-/// Columns of a sector, if there are 72 of them.
-pub(super) const MOST_COLUMNS: usize = MAX_COLUMNS.div_ceil(72) + 1;
+/// Columns of a sector, of a sensor that looks all round.
+pub(super) const MOST_COLUMNS: usize = MAX_COLUMNS.div_ceil(SECTORS) + 1;
 /// The last bits of a level, where its column is written: a level of 1 m changes by 4 um.
-const COLUMN_BITS: u32 = 0b11111;
+const COLUMN_BITS: u32 = MOST_COLUMNS.next_power_of_two() as u32 - 1;
 /// Part of a layer's returns in a sector that may lie below the ground: noise and reflections.
 const BELOW: f32 = 0.2;
 /// As many of them, and the one above.

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::moments::{Points, moments_near};
+use super::moments::{Positions, moments_near};
 use super::{Plane, passes};
 use crate::cloud::{CAPACITY, MAX_LAYERS, Scan};
 use crate::float::least_of;
@@ -90,9 +90,9 @@ impl Minima {
         (self.slices[number], at_m.into())
     }
 
-    pub(super) fn points(&self) -> Points<'_> {
+    pub(super) fn points(&self) -> Positions<'_> {
         let [x_m, y_m, z_m] = &self.at_m;
-        Points { x_m, y_m, z_m }
+        Positions { x_m, y_m, z_m }
     }
 
     /// How many returns lie within `distance_m` of a plane.

@@ -22,7 +22,7 @@ use crate::parameter::{choices, parameters};
 use crate::random::Random;
 use crate::track::Rectangle;
 use minima::Minima;
-use moments::{Points, moments_near};
+use moments::{Positions, moments_near};
 use passes::Band;
 use surface::Surface;
 
@@ -125,7 +125,7 @@ pub struct GroundReport {
     pub candidates: usize,
     /// How many of them lie on the plane.
     pub support: usize,
-    /// Points marked as ground.
+    /// Positions marked as ground.
     pub points: usize,
 }
 
@@ -142,7 +142,7 @@ pub struct Ground {
     heights_m: Vec<f32>,
     /// Horizontal distances of the points.
     distances_m: Vec<f32>,
-    /// Points that are looked at closer.
+    /// Positions that are looked at closer.
     marks: Vec<bool>,
 }
 
@@ -232,7 +232,7 @@ impl Ground {
         const EVERY: usize = 2;
         let near_m = self.parameters.inlier_distance_m as f32;
         let far_squared = self.parameters.candidate_range_m.powi(2) as f32;
-        let points = Points {
+        let points = Positions {
             x_m: scan.x_m(),
             y_m: scan.y_m(),
             z_m: scan.z_m(),

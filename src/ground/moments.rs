@@ -9,13 +9,13 @@ use crate::float::least;
 
 /// Coordinates of points. What stands in the sensor's axis is none.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Points<'a> {
+pub(super) struct Positions<'a> {
     pub(super) x_m: &'a [f32],
     pub(super) y_m: &'a [f32],
     pub(super) z_m: &'a [f32],
 }
 
-/// Points that are looked at together: a column.
+/// Positions that are looked at together: a column.
 const LANES: usize = MAX_LAYERS;
 /// Sums that take turns, so that none waits for itself.
 const TURNS: usize = 2;
@@ -27,7 +27,7 @@ type Sums = [[f32; LANES]; 9];
 /// `far_squared` away; of every so many columns, one is looked at.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 pub(super) fn moments_near(
-    points: Points<'_>,
+    points: Positions<'_>,
     every: usize,
     plane: &Plane,
     near_m: f32,
@@ -101,7 +101,7 @@ fn add(sums: &mut [f32; LANES], a: &[f32; LANES], b: &[f32; LANES]) {
 /// The sum of the squared distances of points to a plane, of which none counts for more than
 /// `most`.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-pub(super) fn squared_distances(points: Points<'_>, plane: &Plane, most: f32) -> f32 {
+pub(super) fn squared_distances(points: Positions<'_>, plane: &Plane, most: f32) -> f32 {
     let [a, b, c] = plane.normal().map(|component| component as f32);
     let height_m = plane.height_m() as f32;
     let count = points.x_m.len();
@@ -127,7 +127,7 @@ pub(super) fn squared_distances(points: Points<'_>, plane: &Plane, most: f32) ->
     sums.iter().sum()
 }
 
-/// Points whose distances are noted before they are summed.
+/// Positions whose distances are noted before they are summed.
 const BLOCK: usize = 512;
 
 /// A column that holds the last few points.
@@ -178,7 +178,7 @@ mod tests {
             let points = points(count);
             let plane = Plane::level(1.8);
             let [x_m, y_m, z_m] = [0, 1, 2].map(|axis| points[axis].as_slice());
-            let moments = moments_near(Points { x_m, y_m, z_m }, 1, &plane, 0.15, 225.0);
+            let moments = moments_near(Positions { x_m, y_m, z_m }, 1, &plane, 0.15, 225.0);
             let near = near(&points, &plane);
             assert_eq!(moments.count, near.len() as f64);
             let (found, expected) = (
@@ -199,7 +199,7 @@ mod tests {
             .map(|n| plane.above_m(&Vector3::new(x_m[n], y_m[n], z_m[n]).map(f64::from)))
             .map(|above_m| (above_m * above_m).min(0.0225))
             .sum();
-        let found = squared_distances(Points { x_m, y_m, z_m }, &plane, 0.0225);
+        let found = squared_distances(Positions { x_m, y_m, z_m }, &plane, 0.0225);
         assert!((f64::from(found) - sum).abs() < 1e-3 * sum, "{found} {sum}");
     }
 }

@@ -67,6 +67,7 @@ impl Grouping {
         self.placer.place(clusters, scene, parameters);
         self.divide(tracks, scene, parameters);
         self.strays.add(tracks, clusters, scene, &mut self.spots);
+        // Looks of the last revolution are none of this one.
         self.groups.clear();
         self.gather(tracks, scene);
         self.join_pieces(tracks, scene);

@@ -19,6 +19,8 @@ mod forecast;
 
 mod grouping;
 
+mod hypothesis;
+
 mod look;
 
 mod motion;

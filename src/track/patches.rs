@@ -30,8 +30,8 @@ impl Placed {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Patch {
     /// Its returns, in the list of all that are placed.
-    pub(super) begin: usize,
-    pub(super) end: usize,
+    begin: usize,
+    end: usize,
     /// The corners of its box, in the frame of [`Placed::at_m`].
     pub(super) low_m: [f32; 2],
     pub(super) high_m: [f32; 2],
