@@ -1,11 +1,15 @@
-//! DBSCAN over the rows of the array.
+//! DBSCAN over the array.
 
-use super::joining::{Joiner, Points};
-use super::row::{self, Centre, Row};
-use super::turning;
+use std::ops::Range;
+
+use super::density::Density;
+use super::joining::{Core, Joiner};
+use super::returns::{Centre, FARTHEST, Returns, nearer};
+use super::runs::Runs;
 use super::window::{Cone, Windows};
 use super::{ClusterParameters, Clusters};
-use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, Scan};
+use crate::cloud::Scan;
+use crate::float::least;
 use crate::marks::marked;
 
 /// The cluster step. Its buffers are made once.
@@ -13,16 +17,11 @@ use crate::marks::marked;
 pub struct Dbscan {
     parameters: ClusterParameters,
     windows: Windows,
-    rows: Vec<Row>,
-    /// Which of many pairs are neighbours, while they are counted.
-    near: Box<[f32; MAX_COLUMNS]>,
-    /// Points that their nearest do not make core points; later those of them that are none but
-    /// have neighbours.
-    open: Vec<Centre>,
+    density: Density,
+    /// Points that have neighbours, but are no core points.
+    border: Vec<Centre>,
     joiner: Joiner,
-    /// First core point of each set of runs, and the set.
-    firsts: Vec<(usize, u32)>,
-    /// Cluster of each set of runs.
+    /// Cluster of each run.
     numbers: Vec<i32>,
     clusters: Clusters,
 }
@@ -33,11 +32,9 @@ impl Dbscan {
         Self {
             parameters: parameters.clone(),
             windows: Windows::new(parameters),
-            rows: (0..MAX_LAYERS).map(|_| Row::new()).collect(),
-            near: Box::new([0.0; MAX_COLUMNS]),
-            open: vec![],
+            density: Density::new(),
+            border: vec![],
             joiner: Joiner::new(),
-            firsts: vec![],
             numbers: vec![],
             clusters: Clusters::default(),
         }
@@ -50,165 +47,78 @@ impl Dbscan {
 
     /// Finds the clusters of the returns that `ground` does not mark.
     pub fn process(&mut self, scan: &Scan, ground: &[bool]) -> &Clusters {
-        let columns = scan.columns();
         self.windows.prepare(scan);
-        turning::turn(scan, ground, &mut self.rows);
         // The few are within any window of an exact search.
-        let few = self.windows.clipped(columns);
-        for row in &mut self.rows {
-            row::count_along(row, columns, few, &self.parameters, &mut self.near);
-        }
-        for layer in 1..MAX_LAYERS {
-            let (below, above) = self.rows.split_at_mut(layer);
-            let row = &mut below[layer - 1];
-            row::count_across(row, &mut above[0], columns, few, &mut self.near);
-        }
-        for row in &mut self.rows {
-            row::judge(row, columns, &self.parameters);
-        }
-        self.find_core_points(columns);
+        let few = self.windows.clipped(scan.columns());
+        self.density.count(scan, ground, few, &self.parameters);
+        self.find_core_points(scan);
         // From here on only they count.
-        for row in &mut self.rows {
-            row::keep_core(row, columns);
-        }
-        let points = Points {
+        self.density.keep_core(scan.len());
+        let core = Core {
             parameters: &self.parameters,
             windows: &self.windows,
-            columns,
+            returns: self.density.returns(scan),
         };
-        self.joiner.join(&mut self.rows, points);
-        self.number_clusters(scan);
+        self.joiner.join(&core, &self.density);
+        self.number_clusters();
         self.adopt_border_points(scan);
-        self.collect_points();
+        self.collect_points(scan.len());
         &self.clusters
     }
 
-    /// Looks closer at the points of which the nearest along and across their layer did not say
-    /// enough.
-    fn find_core_points(&mut self, columns: usize) {
-        self.open.clear();
-        for layer in 0..MAX_LAYERS {
-            let row = &self.rows[layer];
-            let open = marked(&row.is_open[..columns]);
-            let centres = open.map(|column| row.centre(layer, column, &self.parameters));
-            self.open.extend(centres);
-        }
-        let mut open = std::mem::take(&mut self.open);
-        open.retain(|centre| {
+    /// Looks closer at the points of which those close by did not say enough.
+    fn find_core_points(&mut self, scan: &Scan) {
+        self.border.clear();
+        let (returns, is_open, is_core) = self.density.judged(scan);
+        for point in marked(is_open) {
+            let centre = returns.centre(point, &self.parameters);
             let needed = self.parameters.min_points(centre.range_m);
-            let neighbours = self.neighbours_up_to(centre, needed);
-            self.rows[centre.layer].core[centre.column] = neighbours >= needed;
-            (2..needed).contains(&neighbours)
-        });
-        self.open = open;
-    }
-
-    /// How many neighbours a point has, itself included; counting stops at `needed`.
-    fn neighbours_up_to(&self, centre: &Centre, needed: u32) -> u32 {
-        let mut found = 0;
-        for (layer, reach) in self.layers(centre) {
-            let stretches = self.windows.stretches(centre.column, reach, reach);
-            for stretch in stretches.into_iter().filter(|stretch| !stretch.is_empty()) {
-                found += row::count(&self.rows[layer], stretch, centre);
-            }
-            if found >= needed {
-                break;
+            let neighbours = neighbours_up_to(needed, &centre, &returns, &self.windows);
+            is_core[point] = neighbours >= needed;
+            if (2..needed).contains(&neighbours) {
+                self.border.push(centre);
             }
         }
-        found
     }
 
-    /// The layers that can hold neighbours of a point, with their reach: its own first, then
-    /// those below and those above until one is too far. The farther a layer, the less it
-    /// reaches.
-    fn layers(&self, centre: &Centre) -> impl Iterator<Item = (usize, usize)> + use<'_> {
-        let cone = Cone::around(centre.range_m, centre.eps_m);
-        let own = centre.layer;
-        let within = move |layer: usize| {
-            let reach = self.windows.reach(own, layer, cone);
-            reach.map(|reach| (layer, reach))
-        };
-        let below = (0..own).rev().map_while(within);
-        let above = (own + 1..MAX_LAYERS).map_while(within);
-        within(own).into_iter().chain(below).chain(above)
-    }
-
-    /// Numbers clusters by their first core point.
-    fn number_clusters(&mut self, scan: &Scan) {
+    /// Numbers clusters by their first core point: runs are numbered by theirs already.
+    fn number_clusters(&mut self) {
         let Joiner {
             runs, partition, ..
         } = &mut self.joiner;
-        let layered =
-            || (0..MAX_LAYERS).flat_map(|layer| runs.of(layer).iter().map(move |run| (layer, run)));
-        self.firsts.clear();
-        self.firsts
-            .extend((0..runs.count() as u32).map(|set| (usize::MAX, set)));
-        for (layer, run) in layered() {
-            let first = &mut self.firsts[partition.find(run.number) as usize].0;
-            *first = scan.index(run.columns.start, layer).min(*first);
-        }
-        self.firsts.retain(|(first, _)| *first != usize::MAX);
-        self.firsts.sort_unstable();
+        let Clusters { ends, .. } = &mut self.clusters;
+        partition.flatten();
         self.numbers.clear();
-        self.numbers.resize(runs.count(), Clusters::NONE);
-        for (number, (_, set)) in self.firsts.iter().enumerate() {
-            self.numbers[*set as usize] = number as i32;
-        }
-        let Clusters { labels, ends, .. } = &mut self.clusters;
         ends.clear();
-        ends.resize(self.firsts.len(), 0);
-        labels.clear();
-        labels.resize(scan.len(), Clusters::NONE);
-        for (layer, run) in layered() {
-            let number = self.numbers[partition.find(run.number) as usize];
-            ends[number as usize] += run.points as usize;
-            let (columns, own) = (run.columns.clone(), run.number as u16);
-            let run_of = &self.rows[layer].run_of[columns.clone()];
-            for (column, run) in columns.zip(run_of) {
-                if *run == own {
-                    labels[scan.index(column, layer)] = number;
-                }
+        for (run, first) in partition.parents().iter().enumerate() {
+            if *first as usize == run {
+                self.numbers.push(ends.len() as i32);
+                ends.push(0);
+            } else {
+                self.numbers.push(self.numbers[*first as usize]);
             }
+        }
+        for (_, run) in runs.iter() {
+            ends[self.numbers[usize::from(run.number)] as usize] += run.columns.len();
         }
     }
 
     /// A point that is no core point belongs to the cluster of the nearest core point that is
     /// its neighbour (of equally near ones, the first in the array), else to none.
     fn adopt_border_points(&mut self, scan: &Scan) {
-        for centre in &self.open {
-            if let Some(core) = self.nearest_core_point(scan, centre) {
-                let number = self.clusters.labels[core];
-                self.clusters.labels[scan.index(centre.column, centre.layer)] = number;
-                self.clusters.ends[number as usize] += 1;
+        let returns = self.density.returns(scan);
+        let runs = &mut self.joiner.runs;
+        for centre in &self.border {
+            let (_, core) = nearest(centre, &returns, &self.windows);
+            if let Some(run) = runs.numbers(scan.len()).get(core).copied() {
+                self.clusters.ends[self.numbers[usize::from(run)] as usize] += 1;
+                runs.adopt(centre.point, core);
             }
         }
-    }
-
-    fn nearest_core_point(&self, scan: &Scan, centre: &Centre) -> Option<usize> {
-        /// Rounding must not lose a point that is as near as the best one.
-        const SLACK: f32 = 1.001;
-        let mut nearest: Option<(f32, usize)> = None;
-        let mut cone = Cone::around(centre.range_m, centre.eps_m);
-        for (layer, _) in self.layers(centre) {
-            // What is farther than the best one does not matter.
-            let Some(reach) = self.windows.reach(centre.layer, layer, cone) else {
-                continue;
-            };
-            for stretch in self.windows.stretches(centre.column, reach, reach) {
-                if let Some((squared, column)) = row::nearest(&self.rows[layer], stretch, centre) {
-                    let found = (squared, scan.index(column, layer));
-                    if nearest.is_none_or(|best| found < best) {
-                        nearest = Some(found);
-                        cone = Cone::around(centre.range_m, SLACK * squared.sqrt());
-                    }
-                }
-            }
-        }
-        nearest.map(|(_, point)| point)
     }
 
     /// Sorts points into their clusters by counting.
-    fn collect_points(&mut self) {
+    fn collect_points(&mut self, len: usize) {
         let Clusters {
             labels,
             points,
@@ -219,16 +129,60 @@ impl Dbscan {
             // For now where the cluster begins; the loop below moves it to where it ends.
             total += std::mem::replace(end, total);
         }
-        points.clear();
         points.resize(total, 0);
-        for (point, label) in labels.iter().enumerate() {
-            if *label != Clusters::NONE {
+        labels.resize(len, Clusters::NONE);
+        let runs = self.joiner.runs.numbers(len).iter().zip(labels);
+        for (point, (run, label)) in runs.enumerate() {
+            *label = Clusters::NONE;
+            if *run != Runs::NONE {
+                *label = self.numbers[usize::from(*run)];
                 let end = &mut ends[*label as usize];
                 points[*end] = point as u32;
                 *end += 1;
             }
         }
     }
+}
+
+/// Columns to either side in which the neighbours of a point are looked for first.
+const FEW: usize = 8;
+
+/// How many neighbours a point has, itself included, if they are less than `needed`; else that many
+/// at least.
+fn neighbours_up_to(needed: u32, centre: &Centre, returns: &Returns<'_>, windows: &Windows) -> u32 {
+    let cone = Cone::around(centre.range_m, centre.eps_m);
+    let (layers, reach) = windows.extent(centre.layer, cone);
+    let count = |stretches: [Range<usize>; 2]| -> u32 {
+        let counts = stretches.map(|columns| returns.count(&columns, &layers, centre));
+        counts.into_iter().sum()
+    };
+    let few = reach.min(FEW);
+    let mut found = count(windows.stretches(centre.column, few, few));
+    if found < needed
+        && let Some(sides) = windows.beside(centre.column, few, reach)
+    {
+        found += sides.into_iter().map(count).sum::<u32>();
+    }
+    found
+}
+
+/// The nearest neighbour of a point: squared distance and place.
+fn nearest(centre: &Centre, returns: &Returns<'_>, windows: &Windows) -> (f32, usize) {
+    /// Rounding must not lose a point that is as near as the nearest one so far.
+    const SLACK: f32 = 1.001;
+    let cone = Cone::around(centre.range_m, centre.eps_m);
+    let (layers, reach) = windows.extent(centre.layer, cone);
+    let nearest = |stretches: [Range<usize>; 2]| {
+        let found = stretches.map(|columns| returns.nearest(&columns, &layers, centre));
+        found.into_iter().fold(FARTHEST, nearer)
+    };
+    let few = reach.min(FEW);
+    let found = nearest(windows.stretches(centre.column, few, few));
+    // What is farther than the nearest one so far does not matter.
+    let cone = Cone::around(centre.range_m, least(centre.eps_m, SLACK * found.0.sqrt()));
+    let (_, reach) = windows.extent(centre.layer, cone);
+    let sides = windows.beside(centre.column, few, reach);
+    sides.into_iter().flatten().map(nearest).fold(found, nearer)
 }
 
 #[cfg(test)]

@@ -1,10 +1,15 @@
 //! Which core points belong together.
 
+use std::ops::Range;
+
+use multiversion::multiversion;
+
 use super::ClusterParameters;
-use super::row::{self, Row};
+use super::density::Density;
+use super::returns::Returns;
 use super::runs::{Run, Runs};
 use super::window::{Cone, Windows};
-use crate::cloud::{MAX_COLUMNS, MAX_LAYERS};
+use crate::cloud::{CAPACITY, MAX_LAYERS};
 use crate::marks::marked;
 use crate::partition::Partition;
 
@@ -14,136 +19,199 @@ pub(super) struct Joiner {
     pub(super) runs: Runs,
     /// Runs that belong together, by their numbers.
     pub(super) partition: Partition,
-    /// Columns and runs that are looked at closer, for a moment.
-    column_marks: Box<[bool; MAX_COLUMNS]>,
-    run_marks: Box<[u32; MAX_COLUMNS]>,
+    /// Points that are looked at closer, for a moment.
+    marks: Box<[bool; CAPACITY]>,
+    /// The run in each layer from which on the last one was compared.
+    first: [usize; MAX_LAYERS],
 }
 
-/// What is known of a revolution's points before they are joined.
+/// What is known of a revolution's core points before they are joined.
 #[derive(Clone, Copy)]
-pub(super) struct Points<'a> {
+pub(super) struct Core<'a> {
     pub(super) parameters: &'a ClusterParameters,
     pub(super) windows: &'a Windows,
-    pub(super) columns: usize,
+    /// Nothing but core points is looked at.
+    pub(super) returns: Returns<'a>,
 }
 
-impl Points<'_> {
-    /// Whether the point in a column is a neighbour of another one in its layer, and in its
-    /// window.
-    fn sees(&self, row: &Row, layer: usize, column: usize, other: usize) -> bool {
-        let apart = column.abs_diff(other);
-        let centre = row.centre(layer, column, self.parameters);
-        self.windows.clipped(apart) == apart && row.is_neighbour(other, &centre)
-    }
-}
+/// Columns before a run in which another run of its layer often ends that is its neighbour.
+const GAP: usize = 4;
 
 impl Joiner {
     pub(super) fn new() -> Self {
         Self {
-            runs: Runs::default(),
+            runs: Runs::new(),
             partition: Partition::default(),
-            column_marks: Box::new([false; MAX_COLUMNS]),
-            run_marks: Box::new([0; MAX_COLUMNS]),
+            marks: Box::new([false; CAPACITY]),
+            first: [0; MAX_LAYERS],
         }
     }
 
-    /// Joins core points that are neighbours: first along the layers, then along the columns,
-    /// then run by run with the runs of the same layer and of those above, because neighbours
-    /// see each other.
-    pub(super) fn join(&mut self, rows: &mut [Row], points: Points<'_>) {
-        let goes_on = |row: &Row, layer, last, next| points.sees(row, layer, last, next);
-        self.runs
-            .find(points.columns, rows, &mut self.column_marks[..], goes_on);
+    /// Joins core points that are neighbours: first along the layers, over small gaps, then along
+    /// the columns, then run by run with the runs of the same layer and of those above, because
+    /// neighbours see each other.
+    pub(super) fn join(&mut self, core: &Core<'_>, density: &Density) {
+        self.runs.find(&core.returns, density);
         self.partition.reset(self.runs.count());
-        self.join_along_columns(rows, points.columns);
+        self.join_over_gaps(core);
+        self.join_along_columns(density, core.returns.x_m.len());
+        self.partition.flatten();
+        self.runs.note_alike(self.partition.parents());
         for layer in 0..MAX_LAYERS {
             self.partition.flatten();
-            for run in self.runs.of(layer).iter() {
-                join_run(
-                    (layer, run),
-                    &self.runs,
-                    &mut self.partition,
-                    &mut self.run_marks,
-                    rows,
-                    points,
-                );
+            self.first = [0; MAX_LAYERS];
+            for place in 0..self.runs.of_layer(layer).len() {
+                self.join_run(layer, place, core);
+            }
+        }
+    }
+
+    /// Joins each run with another one of its layer that was there shortly before.
+    fn join_over_gaps(&mut self, core: &Core<'_>) {
+        let numbers = self.runs.numbers(core.returns.x_m.len());
+        for (layer, run) in self.runs.iter() {
+            let column = run.columns().start;
+            let first = column * MAX_LAYERS + layer;
+            for apart in 2..=core.windows.clipped(GAP).min(column) {
+                let before = first - apart * MAX_LAYERS;
+                let other = numbers[before];
+                if other != Runs::NONE && core.returns.are_neighbours(before, first) {
+                    self.partition.join(u32::from(other), u32::from(run.number));
+                    break;
+                }
             }
         }
     }
 
     /// Joins the runs that have neighbours in one column of two layers that follow each other.
-    fn join_along_columns(&mut self, rows: &[Row], columns: usize) {
-        for pair in rows.windows(2) {
-            row::mark_meetings(&pair[0], &pair[1], columns, &mut self.column_marks[..]);
-            for column in marked(&self.column_marks[..columns]) {
-                let [a, b] = [0, 1].map(|row: usize| u32::from(pair[row].run_of[column]));
-                self.partition.join(a, b);
-            }
+    fn join_along_columns(&mut self, density: &Density, len: usize) {
+        let numbers = self.runs.numbers(len);
+        let marks = &mut self.marks[..len];
+        mark_meetings(&density.meets[..len], numbers, marks);
+        for point in marked(marks) {
+            let [a, b] = [numbers[point], numbers[point + 1]].map(u32::from);
+            self.partition.join(a, b);
         }
     }
-}
 
-/// Joins a run with all others that any of its points has a neighbour in. Its nearest point
-/// reaches farthest.
-fn join_run(
-    (layer, run): (usize, &Run),
-    runs: &Runs,
-    partition: &mut Partition,
-    marks: &mut [u32; MAX_COLUMNS],
-    rows: &[Row],
-    points: Points<'_>,
-) {
-    let eps_near_m = points.parameters.eps_m(run.low_m);
-    let cone = Cone::around(run.low_m, eps_near_m);
-    let eps_far_m = points.parameters.eps_m(run.high_m);
-    for other in layer..MAX_LAYERS {
-        let Some(reach) = points.windows.reach(layer, other, cone) else {
-            break;
-        };
-        let stretches = points.windows.around(&run.columns, reach);
-        for stretch in stretches.into_iter().filter(|stretch| !stretch.is_empty()) {
-            let own = (run, partition.find(run.number));
-            // Those before it in its layer have seen it.
-            let near = runs.of(other).near(
-                &stretch,
-                own,
-                run.number + 1,
-                eps_far_m,
-                partition.parents(),
-                marks,
-            );
-            for candidate in near {
-                if partition.find(run.number) != partition.find(candidate.number)
-                    && touch(rows, (layer, run), (other, candidate), reach, points)
-                {
-                    partition.join(run.number, candidate.number);
+    /// Joins a run, by its layer and its place there, with all others that any of its points has
+    /// a neighbour in. Its nearest point reaches farthest.
+    fn join_run(&mut self, layer: usize, place: usize, core: &Core<'_>) {
+        let run = &self.runs.of_layer(layer)[place];
+        let own = u32::from(run.number);
+        let eps_near_m = core.parameters.eps_m(run.nearest_m());
+        let cone = Cone::around(run.nearest_m(), eps_near_m);
+        let eps_far_m = core.parameters.eps_m(run.farthest_m());
+        let eps_squared = eps_far_m * eps_far_m;
+        let mut set = self.partition.find(own);
+        for other in layer..MAX_LAYERS {
+            let Some(reach) = core.windows.reach(layer, other, cone) else {
+                break;
+            };
+            let runs = self.runs.of_layer(other);
+            for stretch in core.windows.around(&run.columns(), reach) {
+                if stretch.is_empty() {
+                    continue;
+                }
+                let mut at = first_behind(runs, stretch.start, &mut self.first[other]);
+                if other == layer {
+                    // Those before it have seen it.
+                    at = at.max(place + 1);
+                }
+                while at < runs.len() && runs[at].columns().start < stretch.end {
+                    let candidate = &runs[at];
+                    let number = u32::from(candidate.number);
+                    if self.partition.parents()[number as usize] == set {
+                        at = candidate.alike_until();
+                        continue;
+                    }
+                    if run.squared_distance(candidate) <= eps_squared
+                        && self.partition.find(number) != set
+                        && touch((layer, run), (other, candidate), reach, core)
+                    {
+                        self.partition.join(own, number);
+                        set = self.partition.find(own);
+                    }
+                    at += 1;
                 }
             }
         }
     }
 }
 
-/// Whether any core point of one run is a neighbour of any of the other, `reach` columns off at
-/// most.
+/// The place of the first run of a layer that ends behind a column, looked for from where the last
+/// one was.
+fn first_behind(runs: &[Run], column: usize, place: &mut usize) -> usize {
+    if column == 0 {
+        return 0;
+    }
+    while *place > 0 && runs[*place - 1].columns().end > column {
+        *place -= 1;
+    }
+    while *place < runs.len() && runs[*place].columns().end <= column {
+        *place += 1;
+    }
+    *place
+}
+
+/// Whether any point of one run is a neighbour of any of another, `reach` columns off at most.
 fn touch(
-    rows: &[Row],
     (layer, run): (usize, &Run),
     (other_layer, other): (usize, &Run),
     reach: usize,
-    points: Points<'_>,
+    core: &Core<'_>,
 ) -> bool {
-    let (own, row) = (&rows[layer], &rows[other_layer]);
-    let near = points.windows.around(&other.columns, reach);
-    let near = near
-        .into_iter()
-        .flat_map(|stretch| stretch.start.max(run.columns.start)..stretch.end.min(run.columns.end));
-    near.filter(|column| own.core[*column]).any(|column| {
-        let centre = own.centre(layer, column, points.parameters);
-        let stretches = points.windows.stretches(column, reach, reach);
-        stretches.into_iter().any(|stretch| {
-            let start = stretch.start.max(other.columns.start);
-            let both = start..stretch.end.min(other.columns.end).max(start);
-            row::count(row, both, &centre) > 0
-        })
-    })
+    // What is short is looked at point by point.
+    let (short, long) = if run.columns.len() < other.columns.len() {
+        ((layer, run), (other_layer, other))
+    } else {
+        ((other_layer, other), (layer, run))
+    };
+    let (layer, run) = short;
+    let (other_layer, other) = long;
+    let others = other.columns();
+    for near in core.windows.around(&others, reach) {
+        for column in overlap(&near, &run.columns()) {
+            let point = column * MAX_LAYERS + layer;
+            if other.squared_distance_to(core.returns.position_m(point))
+                > core.returns.eps_squared[point]
+            {
+                continue;
+            }
+            for stretch in core.windows.stretches(column, reach, reach) {
+                let both = overlap(&stretch, &others);
+                if !both.is_empty() && core.returns.is_any(&both, other_layer, point) {
+                    return true;
+                }
+            }
+        }
+    }
+    false
+}
+
+/// The columns of two stretches.
+fn overlap(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+    a.start.max(b.start)..a.end.min(b.end)
+}
+
+/// Marks the core points of which the next one of the array is a core point and a neighbour, where
+/// it is not the same two runs as in the column before.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn mark_meetings(meets: &[bool], run: &[u16], marks: &mut [bool]) {
+    marks.fill(false);
+    let pairs = marks.len().saturating_sub(1);
+    let (own, next) = (&run[..pairs], &run[run.len() - pairs..]);
+    let (meets, marks) = (&meets[..pairs], &mut marks[..pairs]);
+    for pair in 0..pairs {
+        let are_core = (own[pair] != Runs::NONE) & (next[pair] != Runs::NONE);
+        marks[pair] = meets[pair] & are_core;
+    }
+    let followed = pairs.saturating_sub(MAX_LAYERS);
+    let (own, own_before) = (&own[pairs - followed..], &own[..followed]);
+    let (next, next_before) = (&next[pairs - followed..], &next[..followed]);
+    let (met_before, marks) = (&meets[..followed], &mut marks[pairs - followed..]);
+    for pair in 0..followed {
+        let are_same = (own[pair] == own_before[pair]) & (next[pair] == next_before[pair]);
+        marks[pair] &= !(are_same & met_before[pair]);
+    }
 }

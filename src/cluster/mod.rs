@@ -1,20 +1,20 @@
 //! Step four: returns above the ground that belong together (thesis section 4.1.2).
 //!
 //! DBSCAN (Ester et al. 1996) without a tree: the array is sorted by azimuth and elevation
-//! already, so that the neighbours of a point stand in a few short stretches of its rows.
-//! `turning` makes those rows, `window` says in which stretches, `row` compares points along a
-//! layer, `dbscan` is the algorithm,
-//! `joining` says which core points belong together, by way of `runs`.
+//! already, so that the neighbours of a point stand in a few columns of it. `density` counts those
+//! close by, which is enough for most points; `window` says in which columns and layers all others
+//! can be, and `returns` compares points there; `dbscan` is the algorithm, `joining` says which
+//! core points belong together, by way of `runs`.
 
 mod dbscan;
 
+mod density;
+
 mod joining;
 
-mod row;
+mod returns;
 
 mod runs;
-
-mod turning;
 
 mod window;
 

@@ -4,250 +4,246 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::row::{self, Row};
-use crate::cloud::{MAX_COLUMNS, MAX_LAYERS};
+use super::density::Density;
+use super::returns::Returns;
+use crate::cloud::{CAPACITY, MAX_LAYERS};
 use crate::float::{greatest, least};
-use crate::marks::marked;
 
-/// Core points of one layer, each a neighbour of the one before.
+/// Core points of one layer in columns that follow each other, each a neighbour of the one before.
 #[derive(Debug, Clone)]
 pub(super) struct Run {
-    /// Counts the runs of all layers. There are no more than points, so that 16 bits hold it.
-    pub(super) number: u32,
-    /// From the first to behind the last; points between that are no core points do not count.
-    pub(super) columns: Range<usize>,
-    /// How many core points it has.
-    pub(super) points: u32,
-    /// Least range of a point.
-    pub(super) low_m: f32,
-    /// Greatest range of a point.
-    pub(super) high_m: f32,
-    /// The box that holds all points.
-    low: [f32; 3],
-    high: [f32; 3],
+    /// Counts the runs of all layers, in the order in which the array has their first points. There
+    /// are no more than points, so that 16 bits hold it.
+    pub(super) number: u16,
+    pub(super) columns: Range<u16>,
+    /// The place in its layer where the runs end that follow it and are known to belong to its set.
+    alike_until: u16,
+    /// Least x, y, z and range of its points.
+    pub(super) low_m: Corner,
+    /// The greatest ones.
+    pub(super) high_m: Corner,
 }
+
+/// A corner of a box around points: x, y, z, and range.
+type Corner = [f32; 4];
+
+/// The place of the range in a corner.
+const RANGE: usize = 3;
+
+/// No run of any point has the number of none.
+const _: () = assert!(CAPACITY < Runs::NONE as usize);
 
 impl Run {
-    /// A run of no point yet.
-    fn begin(number: u32, column: usize) -> Self {
-        Self {
-            number,
-            columns: column..column,
-            points: 0,
-            low_m: f32::INFINITY,
-            high_m: 0.0,
-            low: [f32::INFINITY; 3],
-            high: [f32::NEG_INFINITY; 3],
-        }
+    /// Range of its nearest point.
+    pub(super) fn nearest_m(&self) -> f32 {
+        self.low_m[RANGE]
     }
 
-    /// Adds a stretch of columns, all of them core points.
-    fn extend(&mut self, stretch: Range<usize>, row: &mut Row) {
-        let (at_m, range_m) = row.points(stretch.clone());
-        for range_m in range_m {
-            self.low_m = least(self.low_m, *range_m);
-            self.high_m = greatest(self.high_m, *range_m);
-        }
-        for (axis, metres) in at_m.into_iter().enumerate() {
-            for metres in metres {
-                self.low[axis] = least(self.low[axis], *metres);
-                self.high[axis] = greatest(self.high[axis], *metres);
-            }
-        }
-        for run in &mut row.run_of[stretch.clone()] {
-            *run = self.number as u16;
-        }
-        self.points += stretch.len() as u32;
-        self.columns.end = stretch.end;
-    }
-}
-
-/// The runs of a layer in the order of their columns.
-#[derive(Debug, Clone)]
-pub(super) struct LayerRuns {
-    runs: Vec<Run>,
-    /// Their boxes: the three least coordinates, then the three greatest.
-    bounds_m: [Vec<f32>; 6],
-    /// The number of the first.
-    first: u32,
-    /// How many runs begin in or before each column.
-    begun: Box<[u16; MAX_COLUMNS]>,
-}
-
-impl LayerRuns {
-    fn new() -> Self {
-        Self {
-            runs: vec![],
-            bounds_m: Default::default(),
-            first: 0,
-            begun: Box::new([0; MAX_COLUMNS]),
-        }
+    /// Range of its farthest point.
+    pub(super) fn farthest_m(&self) -> f32 {
+        self.high_m[RANGE]
     }
 
-    /// All of them.
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Run> {
-        self.runs.iter()
+    /// The place in its layer where the runs end that follow it and are known to belong to its set.
+    pub(super) fn alike_until(&self) -> usize {
+        usize::from(self.alike_until)
     }
 
-    /// Finds the runs anew: stretches of core points that follow each other, and over a gap where
-    /// `goes_on` says of the last column before it and the first behind it that they are
-    /// neighbours. Returns the number of the next layer's first run.
-    fn find(
-        &mut self,
-        first: u32,
-        columns: usize,
-        row: &mut Row,
-        marks: &mut [bool],
-        goes_on: impl Fn(&Row, usize, usize) -> bool,
-    ) -> u32 {
-        self.runs.clear();
-        self.first = first;
-        row.run_of[..columns].fill(Row::NO_RUN);
-        row::mark_edges(row, columns, marks);
-        let mut edges = marked(&marks[..columns]).chain([columns]).peekable();
-        let mut noted = 0;
-        while let Some(begin) = edges.next() {
-            if begin == columns || !row.core[begin] {
-                continue;
-            }
-            let end = edges.peek().copied().unwrap_or(columns);
-            self.note_begun(noted..begin);
-            let last = self.runs.last_mut();
-            match last.filter(|last| goes_on(row, last.columns.end - 1, begin)) {
-                Some(last) => last.extend(begin..end, row),
-                None => {
-                    let mut run = Run::begin(first + self.runs.len() as u32, begin);
-                    run.extend(begin..end, row);
-                    self.runs.push(run);
-                }
-            }
-            noted = begin;
-        }
-        self.note_begun(noted..columns);
-        for (corner, metres) in self.bounds_m.iter_mut().enumerate() {
-            metres.clear();
-            metres.extend(self.runs.iter().map(|run| match corner {
-                0..3 => run.low[corner],
-                _ => run.high[corner - 3],
-            }));
-        }
-        first + self.runs.len() as u32
+    /// Its columns.
+    pub(super) fn columns(&self) -> Range<usize> {
+        usize::from(self.columns.start)..usize::from(self.columns.end)
     }
 
-    /// Notes for a stretch of columns how many runs begin in or before them.
-    fn note_begun(&mut self, stretch: Range<usize>) {
-        let runs = self.runs.len() as u16;
-        for begun in &mut self.begun[stretch] {
-            *begun = runs;
+    /// Square of the distance between its box and a point.
+    #[inline(always)]
+    pub(super) fn squared_distance_to(&self, position_m: [f32; 3]) -> f32 {
+        let mut squared = 0.0;
+        for (axis, metres) in position_m.into_iter().enumerate() {
+            let outside = greatest(self.low_m[axis] - metres, metres - self.high_m[axis]);
+            let apart = greatest(outside, 0.0);
+            squared += apart * apart;
         }
+        squared
     }
 
-    /// The runs that reach into a stretch of columns, by their places.
-    fn within(&self, stretch: &Range<usize>) -> Range<usize> {
-        if stretch.is_empty() {
-            return 0..0;
-        }
-        let mut first = self.begun[stretch.start] as usize;
-        if first > 0 && self.runs[first - 1].columns.end > stretch.start {
-            first -= 1;
-        }
-        first..self.begun[stretch.end - 1] as usize
-    }
-
-    /// The runs in a stretch of columns, from a number on, whose boxes are closer than `eps_m` to
-    /// the box of a run, and whose sets, by number, are not known to be that of the run.
-    pub(super) fn near<'a>(
-        &'a self,
-        stretch: &Range<usize>,
-        (run, set): (&Run, u32),
-        from: u32,
-        eps_m: f32,
-        sets: &[u32],
-        marks: &'a mut [u32],
-    ) -> impl Iterator<Item = &'a Run> + use<'a> {
-        let mut within = self.within(stretch);
-        let from = from.saturating_sub(self.first) as usize;
-        within.start = within.start.max(from).min(within.end);
-        let marks = &mut marks[..within.len()];
-        let sets = &sets[self.first as usize..][within.clone()];
-        mark_near(self, within.clone(), (run, set), eps_m * eps_m, sets, marks);
-        let marked = self.runs[within].iter().zip(marks);
-        marked.filter(|(_, mark)| **mark != 0).map(|(run, _)| run)
+    /// Square of the distance between its box and that of another run.
+    #[inline(always)]
+    pub(super) fn squared_distance(&self, other: &Run) -> f32 {
+        let [x, y, z, _] = [0, 1, 2, RANGE].map(|axis: usize| {
+            let below = self.low_m[axis] - other.high_m[axis];
+            let above = other.low_m[axis] - self.high_m[axis];
+            let apart = greatest(greatest(below, above), 0.0);
+            apart * apart
+        });
+        x + y + z
     }
 }
 
-#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-fn mark_near(
-    layer: &LayerRuns,
-    within: Range<usize>,
-    (run, set): (&Run, u32),
-    eps_squared: f32,
-    sets: &[u32],
-    marks: &mut [u32],
-) {
-    let Run { low, high, .. } = run;
-    let [x_low, y_low, z_low, x_high, y_high, z_high] = &layer.bounds_m;
-    let (x_low, x_high) = (
-        &x_low[within.start..within.end],
-        &x_high[within.start..within.end],
-    );
-    let (y_low, y_high) = (
-        &y_low[within.start..within.end],
-        &y_high[within.start..within.end],
-    );
-    let (z_low, z_high) = (
-        &z_low[within.start..within.end],
-        &z_high[within.start..within.end],
-    );
-    let sets = &sets[..marks.len()];
-    for at in 0..marks.len() {
-        let x = greatest(greatest(x_low[at] - high[0], low[0] - x_high[at]), 0.0);
-        let y = greatest(greatest(y_low[at] - high[1], low[1] - y_high[at]), 0.0);
-        let z = greatest(greatest(z_low[at] - high[2], low[2] - z_high[at]), 0.0);
-        let is_near = x * x + y * y + z * z <= eps_squared;
-        marks[at] = u32::from(is_near & (sets[at] != set));
-    }
-}
-
-/// The runs of every layer.
+/// The runs of every layer, in the order of their columns. Its buffers are made once.
 #[derive(Debug, Clone)]
 pub(super) struct Runs {
-    layers: Vec<LayerRuns>,
-    count: u32,
-}
-
-impl Default for Runs {
-    fn default() -> Self {
-        Self {
-            layers: (0..MAX_LAYERS).map(|_| LayerRuns::new()).collect(),
-            count: 0,
-        }
-    }
+    layers: [Vec<Run>; MAX_LAYERS],
+    count: u16,
+    /// The number of every point's run, or [`Runs::NONE`].
+    of: Box<[u16; CAPACITY]>,
+    /// Where runs begin, or have just ended.
+    edges: Box<[bool; CAPACITY]>,
+    /// The runs that go on, and the corners of what they have so far.
+    open: [u16; MAX_LAYERS],
+    low_m: [[f32; MAX_LAYERS]; 4],
+    high_m: [[f32; MAX_LAYERS]; 4],
 }
 
 impl Runs {
-    /// Finds the runs of all layers anew; `goes_on` is asked of a layer and two of its columns.
-    pub(super) fn find(
-        &mut self,
-        columns: usize,
-        rows: &mut [Row],
-        marks: &mut [bool],
-        goes_on: impl Fn(&Row, usize, usize, usize) -> bool,
-    ) {
-        self.count = 0;
-        for (layer, (runs, row)) in self.layers.iter_mut().zip(rows).enumerate() {
-            let goes_on = |row: &Row, last, next| goes_on(row, layer, last, next);
-            self.count = runs.find(self.count, columns, row, marks, goes_on);
+    /// The number of no run.
+    pub(super) const NONE: u16 = u16::MAX;
+
+    pub(super) fn new() -> Self {
+        Self {
+            layers: Default::default(),
+            count: 0,
+            of: Box::new([Self::NONE; CAPACITY]),
+            edges: Box::new([false; CAPACITY]),
+            open: [Self::NONE; MAX_LAYERS],
+            low_m: Default::default(),
+            high_m: Default::default(),
         }
     }
 
     /// How many there are.
     pub(super) fn count(&self) -> usize {
-        self.count as usize
+        usize::from(self.count)
     }
 
     /// The runs of a layer.
-    pub(super) fn of(&self, layer: usize) -> &LayerRuns {
+    pub(super) fn of_layer(&self, layer: usize) -> &[Run] {
         &self.layers[layer]
+    }
+
+    /// All of them, with their layers.
+    pub(super) fn iter(&self) -> impl Iterator<Item = (usize, &Run)> {
+        let layers = self.layers.iter().enumerate();
+        layers.flat_map(|(layer, runs)| runs.iter().map(move |run| (layer, run)))
+    }
+
+    /// Takes note of which runs follow others of the same set, given the set of each.
+    pub(super) fn note_alike(&mut self, sets: &[u32]) {
+        for runs in &mut self.layers {
+            let set_of = |run: &Run| sets[usize::from(run.number)];
+            let mut next = (u32::MAX, 0);
+            for (place, run) in runs.iter_mut().enumerate().rev() {
+                let set = set_of(run);
+                if set != next.0 {
+                    next = (set, place as u16 + 1);
+                }
+                run.alike_until = next.1;
+            }
+        }
+    }
+
+    /// Gives a point the run of another one.
+    pub(super) fn adopt(&mut self, point: usize, other: usize) {
+        self.of[point] = self.of[other];
+    }
+
+    /// The number of every point's run, or [`Runs::NONE`].
+    pub(super) fn numbers(&self, len: usize) -> &[u16] {
+        &self.of[..len]
+    }
+
+    /// Finds the runs anew.
+    pub(super) fn find(&mut self, returns: &Returns<'_>, density: &Density) {
+        let len = returns.x_m.len();
+        self.layers.iter_mut().for_each(Vec::clear);
+        self.count = 0;
+        self.open = [Self::NONE; MAX_LAYERS];
+        let is_core = &density.is_core[..len];
+        mark_edges(is_core, &density.follows[..len], &mut self.edges[..len]);
+        let is_core = is_core.as_chunks::<MAX_LAYERS>().0.iter();
+        for (column, is_core) in is_core.enumerate() {
+            let edges = &self.edges.as_chunks().0[column];
+            // A byte for each layer, the first one lowest; those that were met are taken out.
+            let mut edges = u128::from_le_bytes(edges.map(u8::from));
+            while edges != 0 {
+                let layer = edges.trailing_zeros() as usize / 8;
+                edges &= edges - 1;
+                self.end(layer, column);
+                if is_core[layer] {
+                    self.begin(layer, column);
+                }
+            }
+            extend(
+                [&returns.x_m, &returns.y_m, &returns.z_m, &returns.range_m]
+                    .map(|metres| &metres.as_chunks().0[column]),
+                (&mut self.low_m, &mut self.high_m),
+            );
+            let of: &mut [u16; MAX_LAYERS] = &mut self.of.as_chunks_mut().0[column];
+            *of = self.open;
+        }
+        for layer in 0..MAX_LAYERS {
+            self.end(layer, len / MAX_LAYERS);
+        }
+    }
+
+    /// Begins a run.
+    fn begin(&mut self, layer: usize, column: usize) {
+        self.open[layer] = self.count;
+        let column = column as u16;
+        self.layers[layer].push(Run {
+            number: self.count,
+            columns: column..column,
+            alike_until: 0,
+            low_m: Corner::default(),
+            high_m: Corner::default(),
+        });
+        self.count += 1;
+        for axis in 0..4 {
+            self.low_m[axis][layer] = f32::INFINITY;
+            self.high_m[axis][layer] = f32::NEG_INFINITY;
+        }
+    }
+
+    /// Ends the run that goes on in a layer, if there is one, before a column.
+    fn end(&mut self, layer: usize, column: usize) {
+        if self.open[layer] != Self::NONE
+            && let Some(run) = self.layers[layer].last_mut()
+        {
+            run.columns.end = column as u16;
+            run.low_m = [0, 1, 2, 3].map(|axis: usize| self.low_m[axis][layer]);
+            run.high_m = [0, 1, 2, 3].map(|axis: usize| self.high_m[axis][layer]);
+            self.open[layer] = Self::NONE;
+        }
+    }
+}
+
+/// Marks the columns where a stretch of core points that follow each other begins, and those
+/// behind where one ends.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn mark_edges(is_core: &[bool], follows: &[bool], edges: &mut [bool]) {
+    if is_core.len() < MAX_LAYERS {
+        return;
+    }
+    edges[..MAX_LAYERS].copy_from_slice(&is_core[..MAX_LAYERS]);
+    let pairs = is_core.len() - MAX_LAYERS;
+    let (before, is_core) = (&is_core[..pairs], &is_core[MAX_LAYERS..]);
+    let (follows, edges) = (&follows[MAX_LAYERS..], &mut edges[MAX_LAYERS..]);
+    let (is_core, follows, edges) = (&is_core[..pairs], &follows[..pairs], &mut edges[..pairs]);
+    for pair in 0..pairs {
+        edges[pair] =
+            (before[pair] | is_core[pair]) & !(before[pair] & is_core[pair] & follows[pair]);
+    }
+}
+
+/// Makes the boxes of all layers hold the points of a column.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn extend(
+    column: [&[f32; MAX_LAYERS]; 4],
+    (low_m, high_m): (&mut [[f32; MAX_LAYERS]; 4], &mut [[f32; MAX_LAYERS]; 4]),
+) {
+    for axis in 0..4 {
+        for layer in 0..MAX_LAYERS {
+            low_m[axis][layer] = least(low_m[axis][layer], column[axis][layer]);
+            high_m[axis][layer] = greatest(high_m[axis][layer], column[axis][layer]);
+        }
     }
 }

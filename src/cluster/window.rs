@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::{ClusterParameters, WindowSetting};
 use crate::cloud::{MAX_LAYERS, Scan};
+use crate::float::greatest;
 
 /// Finds windows that hold every neighbour of a point, from the geometry of the rays alone.
 #[derive(Debug, Clone)]
@@ -100,18 +101,53 @@ impl Windows {
     #[inline]
     pub(super) fn reach(&self, layer: usize, other: usize, cone: Cone) -> Option<usize> {
         if self.setting == WindowSetting::Columns {
-            return Some(self.fixed_columns.min(self.columns / 2));
+            return Some(self.fixed_columns());
         }
+        let chord_squared = self.chord_squared(layer, other, cone);
+        (chord_squared >= 0.0).then(|| self.columns_on(chord_squared))
+    }
+
+    /// The layers that can hold neighbours of a point in a layer, and how many columns to either
+    /// side of it.
+    pub(super) fn extent(&self, layer: usize, cone: Cone) -> (Range<usize>, usize) {
+        if self.setting == WindowSetting::Columns {
+            return (0..MAX_LAYERS, self.fixed_columns());
+        }
+        let mut widest = 0.0;
+        let mut is_seen = |other: usize| {
+            let chord_squared = self.chord_squared(layer, other, cone);
+            widest = greatest(widest, chord_squared);
+            chord_squared >= 0.0
+        };
+        let mut layers = layer..layer;
+        while layers.end < MAX_LAYERS && is_seen(layers.end) {
+            layers.end += 1;
+        }
+        while layers.start > 0 && is_seen(layers.start - 1) {
+            layers.start -= 1;
+        }
+        (layers, self.columns_on(widest))
+    }
+
+    fn fixed_columns(&self) -> usize {
+        self.fixed_columns.min(self.columns / 2)
+    }
+
+    /// Square of the longest chord that azimuths of two layers may span within a cone; negative if
+    /// the layers are too far from each other.
+    #[inline(always)]
+    fn chord_squared(&self, layer: usize, other: usize, cone: Cone) -> f32 {
         let Pair { most, slope } = self.pairs[layer][other];
-        let chord_squared = most - slope * cone.least_cosine;
-        if chord_squared < 0.0 {
-            return None;
-        }
+        most - slope * cone.least_cosine
+    }
+
+    /// How many columns a chord spans at most.
+    fn columns_on(&self, chord_squared: f32) -> usize {
         if chord_squared > LONGEST_CHORD * LONGEST_CHORD {
-            return Some(self.columns / 2);
+            return self.columns / 2;
         }
         let reach = (chord_squared.sqrt() * self.columns_per_chord) as usize + 1 + self.overlap;
-        Some(reach.min(self.columns / 2))
+        reach.min(self.columns / 2)
     }
 
     /// So many columns, as far as neighbours so far off count at all: to an exact window all do.
@@ -125,6 +161,26 @@ impl Windows {
     /// The columns within `reach` of any of `columns`.
     pub(super) fn around(&self, columns: &Range<usize>, reach: usize) -> [Range<usize>; 2] {
         self.stretches(columns.start, reach, columns.len() - 1 + reach)
+    }
+
+    /// The columns that are more than `few` and at most `reach` off a column, to the one side and
+    /// to the other, each of them once; `None` if there are none.
+    pub(super) fn beside(
+        &self,
+        column: usize,
+        few: usize,
+        reach: usize,
+    ) -> Option<[[Range<usize>; 2]; 2]> {
+        let more = reach.checked_sub(few + 1)?;
+        let columns = self.columns;
+        let left = self.stretches((column + columns - few - 1) % columns, more, 0);
+        // The sides may meet in the column behind.
+        let rest = columns - (2 * few + 1) - (more + 1);
+        let right = match rest.min(more + 1) {
+            0 => [0..0, 0..0],
+            count => self.stretches((column + few + 1) % columns, 0, count - 1),
+        };
+        Some([left, right])
     }
 
     /// The columns from `reach` before to `after` behind a column, over the seam at 0: at
@@ -165,6 +221,30 @@ mod tests {
         assert_eq!(windows.stretches(98, 3, 3), [95..100, 0..2]);
         assert_eq!(windows.stretches(99, 0, 0), [99..100, 0..0]);
         assert_eq!(windows.stretches(5, 50, 50), [0..100, 0..0]);
+    }
+
+    #[test]
+    fn what_is_beside_a_column_is_each_column_once() {
+        for columns in [3, 18, 19] {
+            let windows = windows(columns, Profile::Default);
+            for (few, reach) in
+                (0..columns / 2).flat_map(|few| (few..=columns / 2).map(move |reach| (few, reach)))
+            {
+                for column in 0..columns {
+                    let near = windows.stretches(column, few, few).into_iter().flatten();
+                    let beside = windows.beside(column, few, reach).into_iter().flatten();
+                    let mut all: Vec<_> = near.chain(beside.flatten().flatten()).collect();
+                    all.sort_unstable();
+                    let within = windows
+                        .stretches(column, reach, reach)
+                        .into_iter()
+                        .flatten();
+                    let mut expected: Vec<_> = within.collect();
+                    expected.sort_unstable();
+                    assert_eq!(all, expected, "{columns} {column} {few} {reach}");
+                }
+            }
+        }
     }
 
     #[test]
