@@ -21,8 +21,6 @@ pub(super) struct Joiner {
     pub(super) partition: Partition,
     /// Points that are looked at closer, for a moment.
     marks: Box<[bool; CAPACITY]>,
-    /// The run in each layer from which on the last one was compared.
-    first: [usize; MAX_LAYERS],
 }
 
 /// What is known of a revolution's core points before they are joined.
@@ -37,13 +35,15 @@ pub(super) struct Core<'a> {
 /// Columns before a run in which another run of its layer often ends that is its neighbour.
 const GAP: usize = 4;
 
+/// Points may be so much closer to each other, for rounding, than their ranges differ.
+const ROUNDING_M: f32 = 1e-3;
+
 impl Joiner {
     pub(super) fn new() -> Self {
         Self {
             runs: Runs::new(),
             partition: Partition::default(),
             marks: Box::new([false; CAPACITY]),
-            first: [0; MAX_LAYERS],
         }
     }
 
@@ -59,7 +59,6 @@ impl Joiner {
         self.runs.note_alike(self.partition.parents());
         for layer in 0..MAX_LAYERS {
             self.partition.flatten();
-            self.first = [0; MAX_LAYERS];
             for place in 0..self.runs.of_layer(layer).len() {
                 self.join_run(layer, place, core);
             }
@@ -103,6 +102,8 @@ impl Joiner {
         let cone = Cone::around(run.nearest_m(), eps_near_m);
         let eps_far_m = core.parameters.eps_m(run.farthest_m());
         let eps_squared = eps_far_m * eps_far_m;
+        let ranges_m =
+            run.nearest_m() - eps_far_m - ROUNDING_M..run.farthest_m() + eps_far_m + ROUNDING_M;
         let mut set = self.partition.find(own);
         for other in layer..MAX_LAYERS {
             let Some(reach) = core.windows.reach(layer, other, cone) else {
@@ -113,13 +114,19 @@ impl Joiner {
                 if stretch.is_empty() {
                     continue;
                 }
-                let mut at = first_behind(runs, stretch.start, &mut self.first[other]);
+                let mut at = self.runs.first_behind(stretch.start, other);
                 if other == layer {
                     // Those before it have seen it.
                     at = at.max(place + 1);
                 }
                 while at < runs.len() && runs[at].columns().start < stretch.end {
                     let candidate = &runs[at];
+                    if candidate.nearest_m() > ranges_m.end
+                        || candidate.farthest_m() < ranges_m.start
+                    {
+                        at += 1;
+                        continue;
+                    }
                     let number = u32::from(candidate.number);
                     if self.partition.parents()[number as usize] == set {
                         at = candidate.alike_until();
@@ -137,21 +144,6 @@ impl Joiner {
             }
         }
     }
-}
-
-/// The place of the first run of a layer that ends behind a column, looked for from where the last
-/// one was.
-fn first_behind(runs: &[Run], column: usize, place: &mut usize) -> usize {
-    if column == 0 {
-        return 0;
-    }
-    while *place > 0 && runs[*place - 1].columns().end > column {
-        *place -= 1;
-    }
-    while *place < runs.len() && runs[*place].columns().end <= column {
-        *place += 1;
-    }
-    *place
 }
 
 /// Whether any point of one run is a neighbour of any of another, `reach` columns off at most.

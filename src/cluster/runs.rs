@@ -6,7 +6,7 @@ use multiversion::multiversion;
 
 use super::density::Density;
 use super::returns::Returns;
-use crate::cloud::{CAPACITY, MAX_LAYERS};
+use crate::cloud::{CAPACITY, MAX_COLUMNS, MAX_LAYERS};
 use crate::float::{greatest, least};
 
 /// Core points of one layer in columns that follow each other, each a neighbour of the one before.
@@ -29,6 +29,9 @@ type Corner = [f32; 4];
 
 /// The place of the range in a corner.
 const RANGE: usize = 3;
+
+/// Columns for which it is noted together how many runs begin before them.
+const BLOCK: usize = 16;
 
 /// No run of any point has the number of none.
 const _: () = assert!(CAPACITY < Runs::NONE as usize);
@@ -84,6 +87,8 @@ impl Run {
 pub(super) struct Runs {
     layers: [Vec<Run>; MAX_LAYERS],
     count: u16,
+    /// How many runs of each layer begin before the first of so many columns, and so on.
+    begun: [[u16; MAX_LAYERS]; MAX_COLUMNS.div_ceil(BLOCK)],
     /// The number of every point's run, or [`Runs::NONE`].
     of: Box<[u16; CAPACITY]>,
     /// Where runs begin, or have just ended.
@@ -102,6 +107,7 @@ impl Runs {
         Self {
             layers: Default::default(),
             count: 0,
+            begun: [[0; MAX_LAYERS]; MAX_COLUMNS.div_ceil(BLOCK)],
             of: Box::new([Self::NONE; CAPACITY]),
             edges: Box::new([false; CAPACITY]),
             open: [Self::NONE; MAX_LAYERS],
@@ -118,6 +124,17 @@ impl Runs {
     /// The runs of a layer.
     pub(super) fn of_layer(&self, layer: usize) -> &[Run] {
         &self.layers[layer]
+    }
+
+    /// The place of the first run of a layer that ends behind the beginning of a column.
+    pub(super) fn first_behind(&self, column: usize, layer: usize) -> usize {
+        let runs = &self.layers[layer];
+        let begun = usize::from(self.begun[column / BLOCK][layer]);
+        let mut place = begun.saturating_sub(1);
+        while place < runs.len() && runs[place].columns().end <= column {
+            place += 1;
+        }
+        place
     }
 
     /// All of them, with their layers.
@@ -161,6 +178,10 @@ impl Runs {
         mark_edges(is_core, &density.follows[..len], &mut self.edges[..len]);
         let is_core = is_core.as_chunks::<MAX_LAYERS>().0.iter();
         for (column, is_core) in is_core.enumerate() {
+            if column % BLOCK == 0 {
+                let begun = &mut self.begun[column / BLOCK];
+                *begun = self.layers.each_ref().map(|runs| runs.len() as u16);
+            }
             let edges = &self.edges.as_chunks().0[column];
             // A byte for each layer, the first one lowest; those that were met are taken out.
             let mut edges = u128::from_le_bytes(edges.map(u8::from));
