@@ -1,5 +1,7 @@
 //! What the standard library's floats do only with care for NaN, and therefore slowly.
 
+use multiversion::multiversion;
+
 /// The lesser of two numbers, of which none is NaN: one instruction for many at once.
 #[inline(always)]
 pub(crate) fn least<T: PartialOrd>(a: T, b: T) -> T {
@@ -24,6 +26,29 @@ pub(crate) fn greatest_of<const N: usize>(values: [f32; N]) -> f32 {
     folded(values, greatest)
 }
 
+/// The least and the greatest of many numbers, of which none is NaN; infinities of none.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub(crate) fn bounds_of(values: &[f32]) -> [f32; 2] {
+    const LANES: usize = 8;
+    let (lanes, rest) = values.as_chunks::<LANES>();
+    // In turns, so that they are kept as vectors.
+    let mut low = [[f32::INFINITY; LANES]; 2];
+    let mut high = [[f32::NEG_INFINITY; LANES]; 2];
+    for turn in 0..lanes.len() {
+        let (low, high) = (&mut low[turn % 2], &mut high[turn % 2]);
+        for lane in 0..LANES {
+            low[lane] = least(low[lane], lanes[turn][lane]);
+            high[lane] = greatest(high[lane], lanes[turn][lane]);
+        }
+    }
+    let (low, high) = (low.map(least_of), high.map(greatest_of));
+    let mut bounds = [least(low[0], low[1]), greatest(high[0], high[1])];
+    for value in rest {
+        bounds = [least(bounds[0], *value), greatest(bounds[1], *value)];
+    }
+    bounds
+}
+
 /// Compares the halves with each other until one number is left.
 #[inline(always)]
 fn folded<const N: usize>(mut values: [f32; N], better: impl Fn(f32, f32) -> f32) -> f32 {
@@ -44,4 +69,23 @@ pub(crate) fn rounded(value: f32) -> u16 {
     // From here on to twice as far the last bit of a float counts ones.
     const ONES: f32 = (1u32 << 23) as f32;
     (value + ONES).to_bits() as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_hold_all_numbers_wherever_the_outermost_stand() {
+        assert_eq!(bounds_of(&[]), [f32::INFINITY, f32::NEG_INFINITY]);
+        for count in [1, 7, 8, 16, 29] {
+            for (low, high) in [(0, count - 1), (count - 1, 0), (count / 2, count / 3)] {
+                let mut values = vec![1.5; count];
+                values[high] = 4.0;
+                values[low] = -3.0;
+                let highest = values.iter().copied().fold(f32::MIN, f32::max);
+                assert_eq!(bounds_of(&values), [-3.0, highest]);
+            }
+        }
+    }
 }

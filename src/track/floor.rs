@@ -1,5 +1,7 @@
 //! What touches, seen from above.
 
+use multiversion::multiversion;
+
 use crate::float::{greatest, least, rounded};
 use crate::partition::Partition;
 
@@ -60,8 +62,14 @@ impl Floor {
 
     /// The number of a place between the corners.
     #[inline(always)]
-    pub(super) fn place(&self, at_m: [f32; 2]) -> u32 {
+    fn place(&self, at_m: [f32; 2]) -> u32 {
         self.cell(at_m, 0) * self.height + self.cell(at_m, 1)
+    }
+
+    /// The numbers of many places between the corners.
+    pub(super) fn find_places(&self, [x_m, y_m]: [&[f32]; 2], places: &mut Vec<u32>) {
+        places.resize(x_m.len(), 0);
+        find_places(self, x_m, y_m, places);
     }
 
     /// Adds the cell at a place, if it is not there yet.
@@ -103,6 +111,14 @@ impl Floor {
     /// For each cell the part that it belongs to: the first cell of that.
     pub(super) fn parts(&self) -> &[u32] {
         self.partition.parents()
+    }
+}
+
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn find_places(floor: &Floor, x_m: &[f32], y_m: &[f32], places: &mut [u32]) {
+    let (x_m, y_m) = (&x_m[..places.len()], &y_m[..places.len()]);
+    for at in 0..places.len() {
+        places[at] = floor.place([x_m[at], y_m[at]]);
     }
 }
 

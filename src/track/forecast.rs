@@ -79,7 +79,7 @@ impl Forecasts {
 
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn mark_near(patch: &Patch, [x_m, y_m]: [&[f32]; 2], reach_m: &[f32], marks: &mut [bool]) {
-    let (low_m, high_m) = (patch.low_m, patch.high_m);
+    let (low_m, high_m) = (patch.bounds.low_m, patch.bounds.high_m);
     let count = marks.len();
     let (x_m, y_m, reach_m) = (&x_m[..count], &y_m[..count], &reach_m[..count]);
     for track in 0..count {

@@ -135,7 +135,7 @@ impl Grouping {
     /// of a box say.
     fn holds_all(&self, patch: &Patch, origin_m: Vector2<f64>, is_whole: bool) -> Option<usize> {
         let [only] = self.near[..] else { return None };
-        let [[west, south], [east, north]] = [patch.low_m, patch.high_m];
+        let [[west, south], [east, north]] = [patch.bounds.low_m, patch.bounds.high_m];
         let corners = [[west, south], [west, north], [east, south], [east, north]];
         let is_within = |corner: [f32; 2]| {
             let at_m = origin_m + Vector2::from(corner).map(f64::from);

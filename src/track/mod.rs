@@ -1,7 +1,7 @@
 //! Step five: clusters become objects that keep their identity from revolution to revolution.
 //!
-//! `objects` takes a revolution in: `patches` places its returns and parts what does not touch on
-//! the `floor`, `grouping` says which `spots` belong together, given the `forecast` of each track
+//! `objects` takes a revolution in: `patches` takes its returns, by `placing` them, and parts what
+//! does not touch on the `floor`, `grouping` says which `spots` belong together, given the `forecast` of each track
 //! and `strays` near it, `assignment` what is whose, `sight` what is hidden and what is gone. A
 //! `road_user` learns from each `look` its `motion`, its `shape`, its `class`, and by its `trail`
 //! whether it moves; `existence` says whether it is there at all; and one that was lost gets its id
@@ -30,6 +30,8 @@ mod nearest;
 mod objects;
 
 mod patches;
+
+mod placing;
 
 mod rectangle;
 

@@ -1,30 +1,10 @@
 //! Returns of one revolution that may be road users, placed, cluster by cluster and part by part.
 
 use super::floor::Floor;
+use super::placing::{Bounds, Placed, Placing};
 use super::{Scene, TrackParameters};
-use crate::cloud::Scan;
 use crate::cluster::Clusters;
-use crate::float::{greatest, least};
-
-/// One return of a cluster.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Placed {
-    /// Where the sensor was when it saw it, along the axes of the local frame, and relative to
-    /// where the sensor is now.
-    pub(super) at_m: [f32; 2],
-    /// Above the ground.
-    pub(super) above_m: f32,
-    /// Its place in the scan.
-    pub(super) point: u32,
-}
-
-impl Placed {
-    /// Whether it may be a road user's below the height at which trees and roofs are cut off,
-    /// and above that of grass.
-    fn is_at_body_height(&self) -> bool {
-        (self.above_m >= LOW_M) & (self.above_m <= CUT_M)
-    }
-}
+use crate::float::{bounds_of, greatest};
 
 /// A cluster, or a part of one.
 #[derive(Debug, Clone, Copy)]
@@ -32,11 +12,8 @@ pub(super) struct Patch {
     /// Its returns, in the list of all that are placed.
     begin: usize,
     end: usize,
-    /// The corners of its box, in the frame of [`Placed::at_m`].
-    pub(super) low_m: [f32; 2],
-    pub(super) high_m: [f32; 2],
-    floor_m: f32,
-    top_m: f32,
+    /// The box that holds them.
+    pub(super) bounds: Bounds,
     /// It goes on above the height at which it was cut.
     goes_on: bool,
     /// It was cut off something that is no road user, and may be a piece of that.
@@ -44,40 +21,17 @@ pub(super) struct Patch {
 }
 
 impl Patch {
-    /// The patch of all returns from `begin` on.
-    fn of(placed: &[Placed], begin: usize) -> Self {
-        let mut patch = Self {
-            begin,
-            end: placed.len(),
-            low_m: [f32::MAX; 2],
-            high_m: [f32::MIN; 2],
-            floor_m: f32::MAX,
-            top_m: f32::MIN,
-            goes_on: false,
-            is_suspect: false,
-        };
-        for Placed { at_m, above_m, .. } in &placed[begin..] {
-            for (axis, metres) in at_m.iter().enumerate() {
-                patch.low_m[axis] = least(patch.low_m[axis], *metres);
-                patch.high_m[axis] = greatest(patch.high_m[axis], *metres);
-            }
-            patch.floor_m = least(patch.floor_m, *above_m);
-            patch.top_m = greatest(patch.top_m, *above_m);
-        }
-        patch
-    }
-
     /// From corner to corner.
     fn diagonal_m(&self) -> f64 {
-        let side_m = |axis: usize| f64::from(self.high_m[axis] - self.low_m[axis]);
+        let side_m = |axis: usize| f64::from(self.bounds.high_m[axis] - self.bounds.low_m[axis]);
         (side_m(0) * side_m(0) + side_m(1) * side_m(1)).sqrt()
     }
 
     /// Whether it can be a road user as a whole.
     pub(super) fn can_be_road_user(&self, parameters: &TrackParameters) -> bool {
         self.diagonal_m() <= parameters.longest_object_m
-            && f64::from(self.top_m) <= parameters.highest_object_m
-            && f64::from(self.floor_m) <= parameters.clearance_m
+            && f64::from(self.bounds.top_m) <= parameters.highest_object_m
+            && f64::from(self.bounds.floor_m) <= parameters.clearance_m
             && !self.goes_on
     }
 }
@@ -87,6 +41,8 @@ impl Patch {
 pub(super) struct Placer {
     /// Where the sensor is, in the local frame.
     origin_m: [f64; 2],
+    /// The returns of the cluster that is being divided.
+    cluster: Placing,
     placed: Vec<Placed>,
     patches: Vec<Patch>,
     floor: Floor,
@@ -97,8 +53,6 @@ pub(super) struct Placer {
     parts: Vec<Part>,
     /// The part of each return, or [`NO_PART`].
     part_of: Vec<u32>,
-    /// The returns of a cluster, while they are sorted.
-    unsorted: Vec<Placed>,
 }
 
 /// Cells of a cluster that touch.
@@ -155,25 +109,23 @@ impl Placer {
         self.placed.clear();
         self.patches.clear();
         for points in clusters.iter() {
+            self.cluster.place(points, scene, origin_m);
             let begin = self.placed.len();
-            self.placed.extend(points.iter().map(|point| {
-                let number = *point as usize;
-                let [x, y, _] = scene.scan.point_m(number).map(f64::from);
-                let [x, y] = scene.placements[scene.scan.column(number)].local_m([x, y]);
-                Placed {
-                    at_m: [(x - origin_m[0]) as f32, (y - origin_m[1]) as f32],
-                    above_m: scene.heights_m[number],
-                    point: *point,
-                }
-            }));
-            let whole = Patch::of(&self.placed, begin);
+            let whole = Patch {
+                begin,
+                end: begin + points.len(),
+                bounds: self.cluster.bounds(),
+                goes_on: false,
+                is_suspect: false,
+            };
             if whole.diagonal_m() < SMALLEST_DIVIDED_M {
+                self.placed.extend(self.cluster.iter());
                 self.patches.push(whole);
             } else {
                 let is_structure = !whole.can_be_road_user(parameters);
                 let first = self.patches.len();
-                let is_too_tall = f64::from(whole.top_m) > parameters.highest_object_m;
-                self.divide(&whole, is_too_tall, scene.scan);
+                let is_too_tall = f64::from(whole.bounds.top_m) > parameters.highest_object_m;
+                self.divide(&whole.bounds, is_too_tall);
                 for patch in &mut self.patches[first..] {
                     patch.is_suspect = is_structure;
                 }
@@ -191,39 +143,40 @@ impl Placer {
         &self.placed[patch.begin..patch.end]
     }
 
-    /// Replaces the returns of a cluster, which are the last ones, by its parts, one after the
-    /// other and each in the order of the scan. What is above the cut belongs to a part that goes
-    /// on there, unless all of it is too tall.
-    fn divide(&mut self, whole: &Patch, is_too_tall: bool, scan: &Scan) {
-        let own = &self.placed[whole.begin..];
-        let range_m = |placed: &Placed| scan.range_m()[placed.point as usize];
-        let nearest_m = own.iter().map(range_m).fold(f32::MAX, least);
+    /// Adds the parts of the cluster, one after the other and each in the order of the scan. What is
+    /// above the cut belongs to a part that goes on there, unless all of it is too tall.
+    fn divide(&mut self, whole: &Bounds, is_too_tall: bool) {
+        let [nearest_m, _] = bounds_of(self.cluster.range_m());
         let cell_m = CELL_M + CELL_PER_M * greatest(nearest_m - NEAR_M, 0.0);
         self.floor
             .begin(whole.low_m, whole.high_m, cell_m, self.origin_m);
-        self.places.clear();
-        for placed in own {
-            let place = self.floor.place(placed.at_m);
-            self.places.push(place);
-            if placed.is_at_body_height() {
-                self.floor.add(place);
+        self.floor
+            .find_places(self.cluster.at_m(), &mut self.places);
+        for (place, above_m) in self.places.iter().zip(self.cluster.above_m()) {
+            if is_at_body_height(*above_m) {
+                self.floor.add(*place);
             }
         }
         self.floor.join();
-        self.count_cells(whole.begin, is_too_tall, scan);
-        self.assign(whole.begin);
-        self.sort(whole.begin, is_too_tall);
+        self.count_cells(is_too_tall);
+        self.assign();
+        self.sort(is_too_tall);
     }
 
     /// Counts the cells of every part, and those above which there is more, close to the cut.
-    fn count_cells(&mut self, begin: usize, is_too_tall: bool, scan: &Scan) {
+    fn count_cells(&mut self, is_too_tall: bool) {
         let cells = self.floor.len();
         self.covered.clear();
         self.covered.resize(cells, false);
-        let own = self.placed[begin..].iter().zip(&self.places);
-        for (placed, place) in own.filter(|(placed, _)| placed.above_m > CUT_M) {
-            let range_m = scan.range_m()[placed.point as usize];
-            if placed.above_m < CUT_M + greatest(ABOVE_CUT_M, ABOVE_CUT_PER_M * range_m)
+        let ranges_m = self.cluster.range_m().iter();
+        let own = self
+            .cluster
+            .above_m()
+            .iter()
+            .zip(ranges_m.zip(&self.places));
+        for (above_m, (range_m, place)) in own {
+            if *above_m > CUT_M
+                && *above_m < CUT_M + greatest(ABOVE_CUT_M, ABOVE_CUT_PER_M * range_m)
                 && let Some(cell) = self.floor.number(*place)
             {
                 self.covered[cell] = true;
@@ -242,54 +195,64 @@ impl Placer {
     }
 
     /// Finds the part of every return, and where each part's returns begin.
-    fn assign(&mut self, begin: usize) {
+    fn assign(&mut self) {
         self.part_of.clear();
-        for (placed, place) in self.placed[begin..].iter().zip(&self.places) {
-            let mut own = NO_PART;
-            if let Some(cell) = self.floor.number(*place) {
-                let number = self.floor.parts()[cell];
-                let part = &mut self.parts[number as usize];
-                if (placed.above_m <= CUT_M) | part.has_upper {
-                    part.place += 1;
-                    own = number;
-                }
+        let own = self.cluster.above_m().iter().zip(&self.places);
+        self.part_of.extend(own.map(|(above_m, place)| {
+            let Some(cell) = self.floor.number(*place) else {
+                return NO_PART;
+            };
+            let number = self.floor.parts()[cell];
+            let part = &mut self.parts[number as usize];
+            if (*above_m <= CUT_M) | part.has_upper {
+                part.place += 1;
+                number
+            } else {
+                NO_PART
             }
-            self.part_of.push(own);
-        }
-        let mut next = begin;
+        }));
+        let mut next = self.placed.len();
         for part in &mut self.parts {
             next += std::mem::replace(&mut part.place, next);
         }
+        self.placed.resize(next, Placed::default());
     }
 
     /// Puts the returns of every part side by side, and makes the parts patches.
-    fn sort(&mut self, begin: usize, is_too_tall: bool) {
-        self.unsorted.clear();
-        self.unsorted.extend_from_slice(&self.placed[begin..]);
-        for (placed, part) in self.unsorted.iter().zip(&self.part_of) {
+    fn sort(&mut self, is_too_tall: bool) {
+        for (placed, part) in self.cluster.iter().zip(&self.part_of) {
             if *part != NO_PART {
                 let place = &mut self.parts[*part as usize].place;
-                self.placed[*place] = *placed;
+                self.placed[*place] = placed;
                 *place += 1;
             }
         }
         // Each part now ends where the next one begins.
-        let mut start = begin;
         for part in &self.parts {
-            if part.place > start {
-                let mut patch = Patch::of(&self.placed[..part.place], start);
-                patch.goes_on = is_too_tall && part.goes_on();
-                self.patches.push(patch);
-                start = part.place;
+            let begin = self.patches.last().map_or(0, |patch| patch.end);
+            if part.place > begin {
+                self.patches.push(Patch {
+                    begin,
+                    end: part.place,
+                    bounds: Bounds::of(&self.placed[begin..part.place]),
+                    goes_on: is_too_tall && part.goes_on(),
+                    is_suspect: false,
+                });
             }
         }
-        self.placed.truncate(start);
     }
+}
+
+/// Whether a return may be a road user's below the height at which trees and roofs are cut off,
+/// and above that of grass.
+fn is_at_body_height(above_m: f32) -> bool {
+    (above_m >= LOW_M) & (above_m <= CUT_M)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cloud::Scan;
     use crate::cloud::tests::scan_of;
     use crate::cluster::{ClusterParameters, Dbscan};
     use crate::ego::Sweep;

@@ -1,0 +1,131 @@
+//! The returns of one cluster, placed, coordinate by coordinate.
+
+use super::Scene;
+use crate::float::{bounds_of, greatest, least};
+
+/// Returns of a cluster in the order of the scan, each with the sensor's pose at the time of its
+/// column. Its buffers are made once.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Placing {
+    /// How many there are; the buffers hold as many as there ever were.
+    count: usize,
+    /// Along the axes of the local frame, and relative to where the sensor is at the end.
+    x_m: Vec<f32>,
+    y_m: Vec<f32>,
+    above_m: Vec<f32>,
+    range_m: Vec<f32>,
+    point: Vec<u32>,
+}
+
+/// One return of a cluster.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Placed {
+    /// Along the axes of the local frame, and relative to where the sensor is at the end.
+    pub(super) at_m: [f32; 2],
+    /// Above the ground.
+    pub(super) above_m: f32,
+    /// Its place in the scan.
+    pub(super) point: u32,
+}
+
+/// The box that holds some returns.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bounds {
+    /// Its corners from above, in the frame of [`Placed::at_m`].
+    pub(super) low_m: [f32; 2],
+    pub(super) high_m: [f32; 2],
+    /// Its bottom and its top above the ground.
+    pub(super) floor_m: f32,
+    pub(super) top_m: f32,
+}
+
+impl Bounds {
+    /// The box that holds some returns.
+    pub(super) fn of(returns: &[Placed]) -> Self {
+        let mut bounds = Self {
+            low_m: [f32::INFINITY; 2],
+            high_m: [f32::NEG_INFINITY; 2],
+            floor_m: f32::INFINITY,
+            top_m: f32::NEG_INFINITY,
+        };
+        for Placed { at_m, above_m, .. } in returns {
+            for (axis, metres) in at_m.iter().enumerate() {
+                bounds.low_m[axis] = least(bounds.low_m[axis], *metres);
+                bounds.high_m[axis] = greatest(bounds.high_m[axis], *metres);
+            }
+            bounds.floor_m = least(bounds.floor_m, *above_m);
+            bounds.top_m = greatest(bounds.top_m, *above_m);
+        }
+        bounds
+    }
+}
+
+impl Placing {
+    /// Places the returns of a cluster.
+    pub(super) fn place(&mut self, points: &[u32], scene: &Scene<'_>, origin_m: [f64; 2]) {
+        self.count = points.len();
+        let most = self.count.max(self.x_m.len());
+        for metres in [
+            &mut self.x_m,
+            &mut self.y_m,
+            &mut self.above_m,
+            &mut self.range_m,
+        ] {
+            metres.resize(most, 0.0);
+        }
+        self.point.clear();
+        self.point.extend_from_slice(points);
+        let (x_m, y_m) = (scene.scan.x_m(), scene.scan.y_m());
+        let range_m = scene.scan.range_m();
+        let places = self.x_m.iter_mut().zip(&mut self.y_m);
+        let others = self.above_m.iter_mut().zip(&mut self.range_m);
+        for ((point, place), other) in points.iter().zip(places).zip(others) {
+            let number = *point as usize;
+            let at_m = [x_m[number], y_m[number]].map(f64::from);
+            let [x, y] = scene.placements[scene.scan.column(number)].local_m(at_m);
+            *place.0 = (x - origin_m[0]) as f32;
+            *place.1 = (y - origin_m[1]) as f32;
+            *other.0 = scene.heights_m[number];
+            *other.1 = range_m[number];
+        }
+    }
+
+    /// Where they are from above.
+    pub(super) fn at_m(&self) -> [&[f32]; 2] {
+        [&self.x_m[..self.count], &self.y_m[..self.count]]
+    }
+
+    /// Their heights above the ground.
+    pub(super) fn above_m(&self) -> &[f32] {
+        &self.above_m[..self.count]
+    }
+
+    /// Their ranges.
+    pub(super) fn range_m(&self) -> &[f32] {
+        &self.range_m[..self.count]
+    }
+
+    /// All of them.
+    pub(super) fn iter(&self) -> impl Iterator<Item = Placed> {
+        let [x_m, y_m] = self.at_m();
+        let places = x_m.iter().zip(y_m);
+        let others = self.above_m().iter().zip(&self.point);
+        places.zip(others).map(|((x, y), (above_m, point))| Placed {
+            at_m: [*x, *y],
+            above_m: *above_m,
+            point: *point,
+        })
+    }
+
+    /// The box that holds all of them.
+    pub(super) fn bounds(&self) -> Bounds {
+        let [[west, east], [south, north]] = self.at_m().map(bounds_of);
+        let [floor_m, top_m] = bounds_of(self.above_m());
+        Bounds {
+            low_m: [west, south],
+            high_m: [east, north],
+            floor_m,
+            top_m,
+        }
+    }
+}
