@@ -246,7 +246,7 @@ impl Placer {
 /// Whether a return may be a road user's below the height at which trees and roofs are cut off,
 /// and above that of grass.
 fn is_at_body_height(above_m: f32) -> bool {
-    (above_m >= LOW_M) & (above_m <= CUT_M)
+    (LOW_M..=CUT_M).contains(&above_m)
 }
 
 #[cfg(test)]
