@@ -6,7 +6,7 @@
 mod common;
 
 use kreisel::cloud::{Intake, Scan};
-use kreisel::cluster::{ClusterParameters, Clusters, Dbscan};
+use kreisel::cluster::{ClusterParameters, Clusters, Dbscan, WindowSetting};
 use kreisel::config::Configuration;
 use kreisel::parameter::Profile;
 use kreisel::random::Random;
@@ -98,6 +98,11 @@ fn squared_distance(scan: &Scan, a: usize, b: usize) -> f32 {
 }
 
 fn are_neighbours(scan: &Scan, parameters: &ClusterParameters, a: usize, b: usize) -> bool {
+    let apart = scan.column(a).abs_diff(scan.column(b));
+    let apart = apart.min(scan.columns() - apart);
+    if parameters.window == WindowSetting::Columns && apart > parameters.window_columns {
+        return false;
+    }
     let eps = eps_m(scan, parameters, a).min(eps_m(scan, parameters, b));
     squared_distance(scan, a, b) <= eps * eps
 }
@@ -172,12 +177,16 @@ proptest! {
         eps_per_m in 0.0f64..0.05,
         min_points in 1usize..12,
         gap_deg in 0.5f32..9.0,
+        window_columns in prop::option::of(1usize..8),
     ) {
         let distances = random_distances(seed, columns, stray);
         let scan = scan_of(&distances, 0.01, 360.0 - gap_deg);
         let mut parameters = ClusterParameters::profile(Profile::Default);
         (parameters.eps_m, parameters.eps_per_m) = (eps_m, eps_per_m);
         parameters.min_points = min_points;
+        if let Some(columns) = window_columns {
+            (parameters.window, parameters.window_columns) = (WindowSetting::Columns, columns);
+        }
         let mut random = Random::new(seed ^ 1);
         let ground: Vec<bool> = (0..scan.len()).map(|_| random.uniform() < 0.2).collect();
         assert_is_dbscan(&scan, &ground, &parameters);

@@ -111,9 +111,6 @@ impl Joiner {
             };
             let runs = self.runs.of_layer(other);
             for stretch in core.windows.around(&run.columns(), reach) {
-                if stretch.is_empty() {
-                    continue;
-                }
                 let mut at = self.runs.first_behind(stretch.start, other);
                 if other == layer {
                     // Those before it have seen it.
@@ -121,25 +118,20 @@ impl Joiner {
                 }
                 while at < runs.len() && runs[at].columns().start < stretch.end {
                     let candidate = &runs[at];
-                    if candidate.nearest_m() > ranges_m.end
-                        || candidate.farthest_m() < ranges_m.start
-                    {
-                        at += 1;
+                    at += 1;
+                    if !candidate.is_between(&ranges_m) {
                         continue;
                     }
                     let number = u32::from(candidate.number);
                     if self.partition.parents()[number as usize] == set {
                         at = candidate.alike_until();
-                        continue;
-                    }
-                    if run.squared_distance(candidate) <= eps_squared
+                    } else if run.squared_distance(candidate) <= eps_squared
                         && self.partition.find(number) != set
                         && touch((layer, run), (other, candidate), reach, core)
                     {
                         self.partition.join(own, number);
                         set = self.partition.find(own);
                     }
-                    at += 1;
                 }
             }
         }
@@ -171,8 +163,9 @@ fn touch(
                 continue;
             }
             for stretch in core.windows.stretches(column, reach, reach) {
-                let both = overlap(&stretch, &others);
-                if !both.is_empty() && core.returns.is_any(&both, other_layer, point) {
+                let mut both =
+                    overlap(&stretch, &others).map(|column| column * MAX_LAYERS + other_layer);
+                if both.any(|other| core.returns.are_neighbours(point, other)) {
                     return true;
                 }
             }

@@ -106,20 +106,6 @@ impl<'a> Returns<'a> {
             .sum()
     }
 
-    /// Whether any point of a layer in a stretch of columns is a neighbour of a point.
-    #[inline(always)]
-    pub(super) fn is_any(&self, columns: &Range<usize>, layer: usize, point: usize) -> bool {
-        let layer = layer % MAX_LAYERS;
-        let [x_m, y_m, z_m, eps] = [self.x_m, self.y_m, self.z_m, self.eps_squared]
-            .map(|of_all| &of_all.as_chunks::<MAX_LAYERS>().0[columns.start..columns.end]);
-        let (x, y, z) = (self.x_m[point], self.y_m[point], self.z_m[point]);
-        let own = self.eps_squared[point];
-        (0..x_m.len()).any(|at| {
-            let (dx, dy, dz) = (x_m[at][layer] - x, y_m[at][layer] - y, z_m[at][layer] - z);
-            dx * dx + dy * dy + dz * dz <= least(own, eps[at][layer])
-        })
-    }
-
     /// The neighbour of a point that is nearest to it, in a stretch of columns: of these layers,
     /// and perhaps of others. Squared distance and place; of equally near ones the first.
     pub(super) fn nearest(

@@ -25,8 +25,9 @@ pub(super) struct Run {
 }
 
 /// A corner of a box around points: x, y, z, and range.
-type Corner = [f32; 4];
+type Corner = [f32; AXES];
 
+const AXES: usize = 4;
 /// The place of the range in a corner.
 const RANGE: usize = 3;
 
@@ -45,6 +46,12 @@ impl Run {
     /// Range of its farthest point.
     pub(super) fn farthest_m(&self) -> f32 {
         self.high_m[RANGE]
+    }
+
+    /// Whether any of its points may have a range between two.
+    #[inline(always)]
+    pub(super) fn is_between(&self, ranges_m: &Range<f32>) -> bool {
+        self.nearest_m() <= ranges_m.end && self.farthest_m() >= ranges_m.start
     }
 
     /// The place in its layer where the runs end that follow it and are known to belong to its set.
@@ -95,8 +102,8 @@ pub(super) struct Runs {
     edges: Box<[bool; CAPACITY]>,
     /// The runs that go on, and the corners of what they have so far.
     open: [u16; MAX_LAYERS],
-    low_m: [[f32; MAX_LAYERS]; 4],
-    high_m: [[f32; MAX_LAYERS]; 4],
+    low_m: [[f32; MAX_LAYERS]; AXES],
+    high_m: [[f32; MAX_LAYERS]; AXES],
 }
 
 impl Runs {
@@ -218,7 +225,7 @@ impl Runs {
             high_m: Corner::default(),
         });
         self.count += 1;
-        for axis in 0..4 {
+        for axis in 0..AXES {
             self.low_m[axis][layer] = f32::INFINITY;
             self.high_m[axis][layer] = f32::NEG_INFINITY;
         }
@@ -258,10 +265,13 @@ fn mark_edges(is_core: &[bool], follows: &[bool], edges: &mut [bool]) {
 /// Makes the boxes of all layers hold the points of a column.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn extend(
-    column: [&[f32; MAX_LAYERS]; 4],
-    (low_m, high_m): (&mut [[f32; MAX_LAYERS]; 4], &mut [[f32; MAX_LAYERS]; 4]),
+    column: [&[f32; MAX_LAYERS]; AXES],
+    (low_m, high_m): (
+        &mut [[f32; MAX_LAYERS]; AXES],
+        &mut [[f32; MAX_LAYERS]; AXES],
+    ),
 ) {
-    for axis in 0..4 {
+    for axis in 0..AXES {
         for layer in 0..MAX_LAYERS {
             low_m[axis][layer] = least(low_m[axis][layer], column[axis][layer]);
             high_m[axis][layer] = greatest(high_m[axis][layer], column[axis][layer]);

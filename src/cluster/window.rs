@@ -95,9 +95,6 @@ impl Windows {
 
     /// How many columns to either side of a point in `layer` can hold a neighbour of it in
     /// `other`; `None` if none can, however far.
-    ///
-    /// cos(g) = sin v sin w + cos v cos w cos(d) for elevations v, w and an azimuth difference
-    /// d, which spans a chord of the square 2 (1 - cos d).
     #[inline]
     pub(super) fn reach(&self, layer: usize, other: usize, cone: Cone) -> Option<usize> {
         if self.setting == WindowSetting::Columns {
@@ -129,12 +126,16 @@ impl Windows {
         (layers, self.columns_on(widest))
     }
 
+    /// How many columns to either side are looked at whatever the cone, if that is set.
     fn fixed_columns(&self) -> usize {
         self.fixed_columns.min(self.columns / 2)
     }
 
     /// Square of the longest chord that azimuths of two layers may span within a cone; negative if
     /// the layers are too far from each other.
+    ///
+    /// cos(g) = sin v sin w + cos v cos w cos(d) for elevations v, w and an azimuth difference
+    /// d, which spans a chord of the square 2 (1 - cos d).
     #[inline(always)]
     fn chord_squared(&self, layer: usize, other: usize, cone: Cone) -> f32 {
         let Pair { most, slope } = self.pairs[layer][other];
