@@ -217,7 +217,8 @@ impl Pipeline {
         let expected = self.tracker.expect(revolution.time, &self.sweep);
         let ground = self.ground.process(&self.scan, expected);
         done(Step::Ground);
-        let clusters = self.clusters.process(&self.scan, self.ground.mask());
+        let (mask, heights_m) = (self.ground.mask(), self.ground.heights_m());
+        let clusters = self.clusters.process(&self.scan, mask, heights_m);
         done(Step::Cluster);
         let scene = Scene {
             scan: &self.scan,

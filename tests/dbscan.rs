@@ -110,7 +110,9 @@ fn are_neighbours(scan: &Scan, parameters: &ClusterParameters, a: usize, b: usiz
 /// Clusters are the components of core points; a border point belongs to that of its nearest
 /// core neighbour; everything else is noise.
 fn assert_is_dbscan(scan: &Scan, ground: &[bool], parameters: &ClusterParameters) -> usize {
-    let clusters = Dbscan::new(parameters).process(scan, ground).clone();
+    let clusters = Dbscan::new(parameters)
+        .process(scan, ground, &vec![0.0; scan.len()])
+        .clone();
     let truth = BruteForce::new(scan, ground, parameters);
     let mut component_of_cluster = vec![usize::MAX; clusters.len()];
     for point in truth.points.iter().copied() {

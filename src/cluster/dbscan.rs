@@ -45,12 +45,14 @@ impl Dbscan {
         &self.clusters
     }
 
-    /// Finds the clusters of the returns that `ground` does not mark.
-    pub fn process(&mut self, scan: &Scan, ground: &[bool]) -> &Clusters {
+    /// Finds the clusters of the returns that `ground` does not mark, and that are not too high
+    /// above it.
+    pub fn process(&mut self, scan: &Scan, ground: &[bool], heights_m: &[f32]) -> &Clusters {
         self.windows.prepare(scan);
         // The few are within any window of an exact search.
         let few = self.windows.clipped(scan.columns());
-        self.density.count(scan, ground, few, &self.parameters);
+        self.density
+            .count(scan, (ground, heights_m), few, &self.parameters);
         self.find_core_points(scan);
         // From here on only they count.
         self.density.keep_core(scan.len());
@@ -194,7 +196,7 @@ mod tests {
     fn cluster(scan: &Scan, profile: Profile) -> Clusters {
         let ground = vec![false; scan.len()];
         Dbscan::new(&ClusterParameters::profile(profile))
-            .process(scan, &ground)
+            .process(scan, &ground, &vec![0.0; scan.len()])
             .clone()
     }
 
@@ -233,9 +235,27 @@ mod tests {
             .map(|point| scan.column(point) > 50)
             .collect();
         let mut dbscan = Dbscan::new(&ClusterParameters::profile(Profile::Default));
-        let clusters = dbscan.process(&scan, &ground);
+        let clusters = dbscan.process(&scan, &ground, &vec![0.0; scan.len()]);
         assert_eq!(clusters.len(), 1);
         assert_eq!(clusters.points(0).len(), 51 * 16);
+    }
+
+    #[test]
+    fn what_hangs_above_all_road_users_is_not_clustered() {
+        let scan = scan_of(1800, |column, _| if column < 20 { 1000 } else { 0 });
+        let heights_m: Vec<f32> = scan.z_m().iter().map(|z| z + 4.0).collect();
+        let ground = vec![false; scan.len()];
+        let clustered = |profile| {
+            let mut dbscan = Dbscan::new(&ClusterParameters::profile(profile));
+            let clusters = dbscan.process(&scan, &ground, &heights_m);
+            assert_eq!(clusters.len(), 1);
+            clusters.points(0).to_vec()
+        };
+        let low = clustered(Profile::Default);
+        assert!(low.iter().all(|point| heights_m[*point as usize] <= 4.5));
+        // 1 degree up are 0.17 m, 3 degrees 0.52 m.
+        assert_eq!(low.len(), 20 * 9);
+        assert_eq!(clustered(Profile::Thesis).len(), 20 * 16);
     }
 
     #[test]

@@ -88,15 +88,15 @@ impl Density {
     pub(super) fn count(
         &mut self,
         scan: &Scan,
-        ground: &[bool],
+        (ground, heights_m): (&[bool], &[f32]),
         few: usize,
         parameters: &ClusterParameters,
     ) {
         let len = scan.len();
         let chunk = |begin: usize| begin.min(len)..(begin + CHUNK).min(len);
-        self.take(scan, ground, chunk(0), parameters);
+        self.take(scan, (ground, heights_m), chunk(0), parameters);
         for begin in (0..len).step_by(CHUNK) {
-            self.take(scan, ground, chunk(begin + CHUNK), parameters);
+            self.take(scan, (ground, heights_m), chunk(begin + CHUNK), parameters);
             let pairs = PAIRS.iter().filter(|(columns, _)| *columns <= few);
             for (_, apart) in pairs {
                 self.count_pairs(scan, chunk(begin), *apart);
@@ -110,13 +110,13 @@ impl Density {
     fn take(
         &mut self,
         scan: &Scan,
-        ground: &[bool],
+        (ground, heights_m): (&[bool], &[f32]),
         chunk: Range<usize>,
         parameters: &ClusterParameters,
     ) {
         take(
             (&scan.x_m()[chunk.clone()], &scan.range_m()[chunk.clone()]),
-            &ground[chunk.clone()],
+            (&ground[chunk.clone()], &heights_m[chunk.clone()]),
             parameters,
             (
                 &mut self.x_m[chunk.clone()],
@@ -166,14 +166,15 @@ impl Density {
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn take(
     (x_m, range_m): (&[f32], &[f32]),
-    ground: &[bool],
+    (ground, heights_m): (&[bool], &[f32]),
     parameters: &ClusterParameters,
     (taken_m, eps_squared): (&mut [f32], &mut [f32]),
 ) {
     let (range_m, ground) = (&range_m[..x_m.len()], &ground[..x_m.len()]);
+    let (heights_m, highest_m) = (&heights_m[..x_m.len()], parameters.highest_m as f32);
     let (taken_m, eps_squared) = (&mut taken_m[..x_m.len()], &mut eps_squared[..x_m.len()]);
     for point in 0..x_m.len() {
-        let is_taken = (range_m[point] > 0.0) & !ground[point];
+        let is_taken = (range_m[point] > 0.0) & !ground[point] & (heights_m[point] <= highest_m);
         let x = x_m[point];
         taken_m[point] = if is_taken { x } else { f32::INFINITY };
         let eps_m = parameters.eps_m(range_m[point]);
@@ -276,7 +277,7 @@ mod tests {
         parameters.eps_m = 0.1;
         let mut density = Density::new();
         for few in [columns, 2] {
-            density.count(&scan, &ground, few, &parameters);
+            density.count(&scan, (&ground, &vec![0.0; scan.len()]), few, &parameters);
             let (_, is_open, is_core) = density.judged(&scan);
             for column in 0..columns {
                 for layer in 0..MAX_LAYERS {

@@ -37,6 +37,9 @@ choices! {
 parameters! {
     /// The clusters: DBSCAN over the returns that are not ground.
     pub struct ClusterParameters "cluster" {
+        /// Height above the ground up to which returns are clustered. Crowns of trees, fronts of
+        /// houses and bridges above that say nothing of road users, and are half of a city.
+        highest_m: f64 = 4.5, thesis 1000.0, in 1.0..=1000.0, "m";
         /// Where neighbours of a point are looked for.
         window: WindowSetting = WindowSetting::Exact, thesis WindowSetting::Columns, "";
         /// Columns to either side when window is "columns": 2 makes 5 x 16 = 80 candidates.

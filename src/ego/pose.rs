@@ -97,6 +97,11 @@ impl Placement {
         ]
     }
 
+    /// Sine and cosine of its turn.
+    pub fn turn(&self) -> (f64, f64) {
+        (self.sine, self.cosine)
+    }
+
     /// Where the sensor is.
     pub fn origin_m(&self) -> [f64; 2] {
         self.origin_m

@@ -108,6 +108,19 @@ impl Floor {
         self.partition.flatten();
     }
 
+    /// Names the cells by the parts that they belong to; they have no numbers from here on.
+    pub(super) fn name_by_parts(&mut self) {
+        for (place, part) in self.places.iter().zip(self.partition.parents()) {
+            self.numbers[*place as usize] = part + 1;
+        }
+    }
+
+    /// One more than the part of the cell at a place, once it is named; 0 where there is none.
+    #[inline(always)]
+    pub(super) fn name(&self, place: u32) -> u32 {
+        self.numbers[place as usize]
+    }
+
     /// For each cell the part that it belongs to: the first cell of that.
     pub(super) fn parts(&self) -> &[u32] {
         self.partition.parents()

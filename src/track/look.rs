@@ -263,6 +263,9 @@ impl View {
     }
 }
 
+/// Difference of ranges within which the return of the next layer is of the same thing.
+pub(super) const SAME_M: f32 = 0.8;
+
 /// Whether something nearer hides what is above a point.
 fn is_covered(scan: &Scan, point: usize) -> bool {
     let above_m = scan.range_m()[point + 1];
@@ -272,8 +275,6 @@ fn is_covered(scan: &Scan, point: usize) -> bool {
 /// Share of a group's columns in which the ray above its topmost return met something at the
 /// same distance.
 fn goes_on(spots: &[Spot], scan: &Scan) -> f64 {
-    /// Distance within which the next return is of the same thing.
-    const SAME_M: f32 = 0.8;
     let (mut columns, mut on) = (0u32, 0u32);
     for (number, spot) in spots.iter().enumerate() {
         let point = spot.point as usize;

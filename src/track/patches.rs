@@ -50,32 +50,41 @@ pub(super) struct Placer {
     places: Vec<u32>,
     /// Whether there is more above each cell.
     covered: Vec<bool>,
+    /// That of what belongs to none, and all others.
     parts: Vec<Part>,
-    /// The part of each return, or [`NO_PART`].
+    /// The part of each return.
     part_of: Vec<u32>,
 }
 
 /// Cells of a cluster that touch.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Part {
     /// Cells, and those above which there is more.
     cells: u32,
     covered: u32,
-    /// Whether what is above the cut belongs to it.
-    has_upper: bool,
+    /// What is higher does not belong to it.
+    cut_m: f32,
     /// Where its returns begin; later where they end.
     place: usize,
 }
 
 impl Part {
+    /// That of nothing.
+    const EMPTY: Self = Self {
+        cells: 0,
+        covered: 0,
+        cut_m: f32::NEG_INFINITY,
+        place: 0,
+    };
+
     /// Whether it is a wall or a trunk.
     fn goes_on(&self) -> bool {
         f64::from(self.covered) >= GOES_ON * f64::from(self.cells)
     }
 }
 
-/// What belongs to no part.
-const NO_PART: u32 = u32::MAX;
+/// The part of what belongs to none.
+const NO_PART: u32 = 0;
 /// Side of the cells of which a part consists: surfaces of one body are closer to each other,
 /// seen from above, and people are farther from the hedge that they pass.
 const CELL_M: f32 = 0.3;
@@ -108,13 +117,19 @@ impl Placer {
         self.origin_m = origin_m;
         self.placed.clear();
         self.patches.clear();
+        self.cluster.begin(scene.placements, origin_m);
         for points in clusters.iter() {
-            self.cluster.place(points, scene, origin_m);
+            self.cluster.place(points, scene);
+            let mut bounds = self.cluster.bounds();
+            if (CUT_M..parameters.highest_object_m as f32).contains(&bounds.top_m) {
+                // What was too high to be clustered says that this is no road user either.
+                bounds.top_m = greatest(bounds.top_m, self.cluster.goes_on_to_m(scene));
+            }
             let begin = self.placed.len();
             let whole = Patch {
                 begin,
                 end: begin + points.len(),
-                bounds: self.cluster.bounds(),
+                bounds,
                 goes_on: false,
                 is_suspect: false,
             };
@@ -183,33 +198,29 @@ impl Placer {
             }
         }
         self.parts.clear();
-        self.parts.resize(cells, Part::default());
+        self.parts.resize(1 + cells, Part::EMPTY);
         for (part, is_covered) in self.floor.parts().iter().zip(&self.covered) {
-            let part = &mut self.parts[*part as usize];
+            let part = &mut self.parts[1 + *part as usize];
             part.cells += 1;
             part.covered += u32::from(*is_covered);
         }
-        for part in &mut self.parts {
-            part.has_upper = !is_too_tall && part.goes_on();
+        for part in &mut self.parts[1..] {
+            let has_upper = !is_too_tall && part.goes_on();
+            part.cut_m = if has_upper { f32::INFINITY } else { CUT_M };
         }
     }
 
     /// Finds the part of every return, and where each part's returns begin.
     fn assign(&mut self) {
+        self.floor.name_by_parts();
         self.part_of.clear();
         let own = self.cluster.above_m().iter().zip(&self.places);
         self.part_of.extend(own.map(|(above_m, place)| {
-            let Some(cell) = self.floor.number(*place) else {
-                return NO_PART;
-            };
-            let number = self.floor.parts()[cell];
+            let number = self.floor.name(*place);
             let part = &mut self.parts[number as usize];
-            if (*above_m <= CUT_M) | part.has_upper {
-                part.place += 1;
-                number
-            } else {
-                NO_PART
-            }
+            let is_own = *above_m <= part.cut_m;
+            part.place += usize::from(is_own);
+            if is_own { number } else { NO_PART }
         }));
         let mut next = self.placed.len();
         for part in &mut self.parts {
@@ -228,7 +239,7 @@ impl Placer {
             }
         }
         // Each part now ends where the next one begins.
-        for part in &self.parts {
+        for part in &self.parts[1..] {
             let begin = self.patches.last().map_or(0, |patch| patch.end);
             if part.place > begin {
                 self.patches.push(Patch {
@@ -264,7 +275,7 @@ mod tests {
         let scan = scan_of(1800, distance_cm);
         let heights_m: Vec<f32> = scan.z_m().iter().map(|z| z + 1.9).collect();
         let mut dbscan = Dbscan::new(&ClusterParameters::profile(Profile::Default));
-        let clusters = dbscan.process(&scan, &vec![false; scan.len()]);
+        let clusters = dbscan.process(&scan, &vec![false; scan.len()], &heights_m);
         let ground = GroundReport {
             plane: Plane::level(1.9),
             origin: Origin::Found,
@@ -306,6 +317,21 @@ mod tests {
             assert!(of_own.all(|column| columns.contains(&column)));
             assert!(!patch.is_suspect);
         }
+    }
+
+    #[test]
+    fn what_goes_on_above_all_that_is_clustered_is_no_road_user() {
+        let parameters = TrackParameters::profile(Profile::Default);
+        // 17 m away layers 12 and 13 pass 4.0 and 4.6 m above the ground.
+        let highest = |layers: usize| {
+            let (placer, _) = patches(|column, layer| match column {
+                100..105 if layer < layers => 1700,
+                _ => 0,
+            });
+            placer.patches()[0]
+        };
+        assert!(highest(12).can_be_road_user(&parameters));
+        assert!(!highest(13).can_be_road_user(&parameters));
     }
 
     #[test]

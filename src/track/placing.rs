@@ -1,6 +1,8 @@
 //! The returns of one cluster, placed, coordinate by coordinate.
 
 use super::Scene;
+use super::look::SAME_M;
+use crate::ego::Placement;
 use crate::float::{bounds_of, greatest, least};
 
 /// Returns of a cluster in the order of the scan, each with the sensor's pose at the time of its
@@ -15,6 +17,16 @@ pub(super) struct Placing {
     above_m: Vec<f32>,
     range_m: Vec<f32>,
     point: Vec<u32>,
+    /// How each column is placed.
+    columns: Vec<Turn>,
+}
+
+/// A turn, and a shift from where the sensor is at the end, in the plane.
+#[derive(Debug, Clone, Copy)]
+struct Turn {
+    origin_m: [f32; 2],
+    sine: f32,
+    cosine: f32,
 }
 
 /// One return of a cluster.
@@ -61,8 +73,22 @@ impl Bounds {
 }
 
 impl Placing {
+    /// Takes over where the sensor was at each column, relative to where it is at the end.
+    pub(super) fn begin(&mut self, placements: &[Placement], origin_m: [f64; 2]) {
+        self.columns.clear();
+        self.columns.extend(placements.iter().map(|placement| {
+            let (sine, cosine) = placement.turn();
+            let own_m = placement.origin_m();
+            Turn {
+                origin_m: [0, 1].map(|axis| (own_m[axis] - origin_m[axis]) as f32),
+                sine: sine as f32,
+                cosine: cosine as f32,
+            }
+        }));
+    }
+
     /// Places the returns of a cluster.
-    pub(super) fn place(&mut self, points: &[u32], scene: &Scene<'_>, origin_m: [f64; 2]) {
+    pub(super) fn place(&mut self, points: &[u32], scene: &Scene<'_>) {
         self.count = points.len();
         let most = self.count.max(self.x_m.len());
         for metres in [
@@ -75,19 +101,33 @@ impl Placing {
         }
         self.point.clear();
         self.point.extend_from_slice(points);
-        let (x_m, y_m) = (scene.scan.x_m(), scene.scan.y_m());
-        let range_m = scene.scan.range_m();
+        let scan = scene.scan;
+        let (x_m, y_m) = (scan.x_m(), &scan.y_m()[..scan.len()]);
+        let (range_m, heights_m) = (scan.range_m(), &scene.heights_m[..scan.len()]);
         let places = self.x_m.iter_mut().zip(&mut self.y_m);
         let others = self.above_m.iter_mut().zip(&mut self.range_m);
         for ((point, place), other) in points.iter().zip(places).zip(others) {
             let number = *point as usize;
-            let at_m = [x_m[number], y_m[number]].map(f64::from);
-            let [x, y] = scene.placements[scene.scan.column(number)].local_m(at_m);
-            *place.0 = (x - origin_m[0]) as f32;
-            *place.1 = (y - origin_m[1]) as f32;
-            *other.0 = scene.heights_m[number];
+            let (x, y) = (x_m[number], y_m[number]);
+            let turn = &self.columns[scan.column(number)];
+            *place.0 = turn.origin_m[0] + x * turn.cosine - y * turn.sine;
+            *place.1 = turn.origin_m[1] + x * turn.sine + y * turn.cosine;
+            *other.0 = heights_m[number];
             *other.1 = range_m[number];
         }
+    }
+
+    /// Height above the ground of what the rays directly above its own ones met at about the same
+    /// range, be it of the cluster or not; minus infinity if there is nothing.
+    pub(super) fn goes_on_to_m(&self, scene: &Scene<'_>) -> f32 {
+        let ranges_m = scene.scan.range_m();
+        let above = self.point[..self.count].iter().zip(self.range_m());
+        let above = above.filter_map(|(point, range_m)| {
+            let above = *point as usize + 1;
+            let goes_on = (ranges_m.get(above)? - range_m).abs() < SAME_M;
+            goes_on.then(|| scene.heights_m[above])
+        });
+        above.fold(f32::NEG_INFINITY, greatest)
     }
 
     /// Where they are from above.
