@@ -1,12 +1,24 @@
 //! The cheapest pairing of two sets (Kuhn 1955, in the shortest-path form of Jonker, Volgenant
 //! 1987).
 
+use crate::partition::Partition;
+
+/// A row and a column that may become a pair.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Candidate {
+    pub(super) row: usize,
+    pub(super) column: usize,
+    pub(super) cost: f64,
+}
+
 /// Pairs rows with columns. Its buffers are made once.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Assigner {
     pairs: Vec<Option<usize>>,
-    is_row_met: Vec<bool>,
-    is_column_met: Vec<bool>,
+    /// Which rows, and behind them which columns, candidates connect.
+    connected: Partition,
+    /// The candidates, those of each part side by side.
+    candidates: Vec<Candidate>,
     /// The part that is solved: its rows, its columns, and their costs.
     rows: Vec<usize>,
     columns: Vec<usize>,
@@ -15,34 +27,42 @@ pub(super) struct Assigner {
 }
 
 impl Assigner {
-    /// Pairs rows with columns so that the sum of costs is least. Pairs that cost `forbidden` or
-    /// more are never made, and leaving a row alone costs `forbidden`. Among equally cheap
-    /// pairings the one is taken in which lower rows have lower columns. `cost` is row by row.
+    /// Pairs rows with columns so that the sum of costs is least. Other pairs than the candidates
+    /// that cost less than `forbidden` are never made, and leaving a row alone costs `forbidden`.
+    /// Among equally cheap pairings the one is taken in which lower rows have lower columns.
     ///
-    /// Rows and columns that no allowed pairs connect do not concern each other: each such part
-    /// is solved for itself.
+    /// Rows and columns that no candidates connect do not concern each other: each such part is
+    /// solved for itself.
     pub(super) fn assign(
         &mut self,
-        rows: usize,
-        columns: usize,
-        cost: &[f64],
+        (rows, columns): (usize, usize),
+        candidates: &[Candidate],
         forbidden: f64,
     ) -> &[Option<usize>] {
         refill(&mut self.pairs, rows, None);
-        refill(&mut self.is_row_met, rows, false);
-        refill(&mut self.is_column_met, columns, false);
-        for first in 0..rows {
-            if std::mem::replace(&mut self.is_row_met[first], true) {
-                continue;
-            }
-            self.connect(first, columns, cost, forbidden);
-            self.cost.clear();
-            for row in &self.rows {
-                let own = self.columns.iter();
-                self.cost
-                    .extend(own.map(|column| cost[row * columns + column]));
-            }
+        self.connected.reset(rows + columns);
+        self.candidates.clear();
+        for candidate in candidates.iter().filter(|pair| pair.cost < forbidden) {
+            let (row, column) = (candidate.row as u32, (rows + candidate.column) as u32);
+            self.connected.join(row, column);
+            self.candidates.push(*candidate);
+        }
+        self.connected.flatten();
+        let part_of = |candidate: &Candidate| self.connected.parents()[candidate.row];
+        self.candidates
+            .sort_unstable_by_key(|pair| (part_of(pair), pair.row, pair.column));
+        for part in self.candidates.chunk_by(|a, b| part_of(a) == part_of(b)) {
+            sort_out(&mut self.rows, part.iter().map(|pair| pair.row));
+            sort_out(&mut self.columns, part.iter().map(|pair| pair.column));
             let size = (self.rows.len(), self.columns.len());
+            refill(&mut self.cost, size.0 * size.1, f64::MAX);
+            for candidate in part {
+                let row = self.rows.binary_search(&candidate.row);
+                let column = self.columns.binary_search(&candidate.column);
+                if let (Ok(row), Ok(column)) = (row, column) {
+                    self.cost[row * size.1 + column] = candidate.cost;
+                }
+            }
             let pairs = self.part.solve(size, &self.cost, forbidden);
             for (row, column) in self.rows.iter().zip(pairs) {
                 self.pairs[*row] = column.map(|column| self.columns[column]);
@@ -55,33 +75,14 @@ impl Assigner {
     pub(super) fn pairs(&self) -> &[Option<usize>] {
         &self.pairs
     }
+}
 
-    /// Finds the rows and columns that allowed pairs connect with a row.
-    fn connect(&mut self, first: usize, columns: usize, cost: &[f64], forbidden: f64) {
-        let is_allowed = |row: usize, column: usize| cost[row * columns + column] < forbidden;
-        self.rows.clear();
-        self.columns.clear();
-        self.rows.push(first);
-        let mut next = 0;
-        while let Some(row) = self.rows.get(next).copied() {
-            next += 1;
-            for (column, is_met) in self.is_column_met.iter_mut().enumerate() {
-                if *is_met || !is_allowed(row, column) {
-                    continue;
-                }
-                *is_met = true;
-                self.columns.push(column);
-                for (other, is_met) in self.is_row_met.iter_mut().enumerate() {
-                    if !*is_met && is_allowed(other, column) {
-                        *is_met = true;
-                        self.rows.push(other);
-                    }
-                }
-            }
-        }
-        self.rows.sort_unstable();
-        self.columns.sort_unstable();
-    }
+/// Makes a list of some numbers in order, each once.
+fn sort_out(list: &mut Vec<usize>, numbers: impl Iterator<Item = usize>) {
+    list.clear();
+    list.extend(numbers);
+    list.sort_unstable();
+    list.dedup();
 }
 
 /// Makes a list of so many times the same.
@@ -223,6 +224,17 @@ mod tests {
         go(0, rows, columns, cost, forbidden, 0)
     }
 
+    /// All pairs, row by row, the last one first.
+    fn candidates(columns: usize, cost: &[f64]) -> Vec<Candidate> {
+        let all = cost.iter().enumerate().rev();
+        let pair = |(number, cost): (usize, &f64)| Candidate {
+            row: number / columns,
+            column: number % columns,
+            cost: *cost,
+        };
+        all.map(pair).collect()
+    }
+
     #[test]
     fn the_sum_is_the_least_there_is() {
         let mut random = Random::new(4);
@@ -232,7 +244,7 @@ mod tests {
                 .map(|_| 12.0 * random.uniform())
                 .collect();
             let mut assigner = Assigner::default();
-            let pairs = assigner.assign(rows, columns, &cost, 8.0);
+            let pairs = assigner.assign((rows, columns), &candidates(columns, &cost), 8.0);
             let sum: f64 = pairs
                 .iter()
                 .enumerate()
@@ -258,7 +270,7 @@ mod tests {
             };
             let cost: Vec<f64> = (0..rows * columns).map(|_| price()).collect();
             let mut assigner = Assigner::default();
-            let by_parts = assigner.assign(rows, columns, &cost, 8.0);
+            let by_parts = assigner.assign((rows, columns), &candidates(columns, &cost), 8.0);
             let mut all = Part::default();
             assert_eq!(by_parts, all.solve((rows, columns), &cost, 8.0));
         }
@@ -269,6 +281,7 @@ mod tests {
         // Row 0 is a little nearer to column 0, row 1 can have nothing else.
         let cost = [1.0, 1.5, 2.0, 100.0];
         let mut assigner = Assigner::default();
-        assert_eq!(assigner.assign(2, 2, &cost, 10.0), [Some(1), Some(0)]);
+        let pairs = assigner.assign((2, 2), &candidates(2, &cost), 10.0);
+        assert_eq!(pairs, [Some(1), Some(0)]);
     }
 }

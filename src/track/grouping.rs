@@ -2,9 +2,10 @@
 
 use nalgebra::Vector2;
 
+use super::claims::Claims;
 use super::forecast::{Forecast, Forecasts};
 use super::look::Look;
-use super::patches::{Patch, Placer};
+use super::patches::Placer;
 use super::rectangle::Extent;
 use super::road_user::Track;
 use super::spots::Spot;
@@ -27,6 +28,7 @@ pub(super) struct Grouping {
     /// Where the tracks are expected, and which of them may be in a patch.
     forecasts: Forecasts,
     near: Vec<usize>,
+    claims: Claims,
     /// The bounds of each group, and the one that it joins.
     boxes: Vec<[Vector2<f64>; 2]>,
     target: Vec<usize>,
@@ -45,8 +47,6 @@ pub(super) struct Group {
     pub(super) claimed_by: Option<usize>,
 }
 
-/// In structure only what is well within the box of a track may be its own.
-const STRUCTURE_MARGIN_M: f64 = 0.15;
 /// Two free groups this close may be pieces of one vehicle.
 const GAP_M: f64 = 0.45;
 const LONGEST_JOINED_M: f64 = 5.4;
@@ -106,60 +106,29 @@ impl Grouping {
                 continue;
             }
             let begin = self.spots.len();
-            let mut claims = Claims::default();
-            let all = self.holds_all(patch, origin_m, is_whole);
-            for placed in self.placer.placed(patch) {
-                let at_m = origin_m + Vector2::from(placed.at_m).map(f64::from);
-                let track = all.or_else(|| self.nearest(at_m, is_whole));
-                claims.note(track);
+            let placed = self.placer.placed(patch);
+            self.claims
+                .settle(placed, &self.near, &self.forecasts, is_whole);
+            for (placed, track) in placed.iter().zip(self.claims.owners()) {
                 if let Some(group) = track.map(|track| track as u32).or(is_whole.then_some(own)) {
+                    let at_m = origin_m + Vector2::from(placed.at_m).map(f64::from);
                     self.spots.push(Spot::new(scene, placed.point, at_m, group));
                 }
             }
             let spots = &mut self.spots[begin..];
             // A part that reaches out of the only box belongs to it as long as the whole can be
             // one object.
-            if let (Some(track), true) = (claims.only(), is_whole) {
-                let share = f64::from(claims.count) / spots.len() as f64;
-                if share > LEAST_CLAIM && fits(spots, self.forecasts.of(track)) {
-                    for spot in spots.iter_mut() {
-                        spot.group = track as u32;
-                    }
+            if is_whole
+                && let Some((track, share)) = self.claims.only()
+                && share > LEAST_CLAIM
+                && fits(spots, self.forecasts.of(track))
+            {
+                for spot in spots.iter_mut() {
+                    spot.group = track as u32;
                 }
             }
             align_seam(spots, tracks, scene.scan.duration_s());
         }
-    }
-
-    /// The only track that is near a patch, if all of the patch lies in its place, as the corners
-    /// of a box say.
-    fn holds_all(&self, patch: &Patch, origin_m: Vector2<f64>, is_whole: bool) -> Option<usize> {
-        let [only] = self.near[..] else { return None };
-        let [[west, south], [east, north]] = [patch.bounds.low_m, patch.bounds.high_m];
-        let corners = [[west, south], [west, north], [east, south], [east, north]];
-        let is_within = |corner: [f32; 2]| {
-            let at_m = origin_m + Vector2::from(corner).map(f64::from);
-            self.nearest(at_m, is_whole).is_some()
-        };
-        corners.into_iter().all(is_within).then_some(only)
-    }
-
-    /// The nearest of the tracks that are near a patch, if it can have a return there.
-    fn nearest(&self, at_m: Vector2<f64>, is_whole: bool) -> Option<usize> {
-        let distances = self.near.iter().filter_map(|track| {
-            let Forecast {
-                outline, margin_m, ..
-            } = self.forecasts.of(*track);
-            let margin_m = if is_whole {
-                *margin_m
-            } else {
-                STRUCTURE_MARGIN_M
-            };
-            let distance_m = outline.distance_within_m(at_m.into(), margin_m)?;
-            Some((distance_m, *track))
-        });
-        let nearest = distances.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        nearest.map(|(_, track)| track)
     }
 
     /// Puts the spots of every group side by side and looks at it, unless it is as it was.
@@ -203,8 +172,10 @@ impl Grouping {
         for group in 1..=bound {
             self.begins[group] += self.begins[group - 1];
         }
-        self.sorted.clear();
-        self.sorted.extend_from_slice(&self.spots);
+        // What is in it is overwritten.
+        self.sorted.truncate(self.spots.len());
+        self.sorted
+            .extend_from_slice(&self.spots[self.sorted.len()..]);
         for spot in &self.spots {
             let at = &mut self.begins[spot.group as usize];
             self.sorted[*at] = *spot;
@@ -306,29 +277,6 @@ impl Grouping {
             [Vector2::repeat(f64::MAX), Vector2::repeat(f64::MIN)],
             |[low, high], spot| [low.inf(&spot.at_m), high.sup(&spot.at_m)],
         )
-    }
-}
-
-/// The tracks in whose places the returns of a patch were found.
-#[derive(Default)]
-struct Claims {
-    count: u32,
-    last: Option<usize>,
-    are_several: bool,
-}
-
-impl Claims {
-    fn note(&mut self, track: Option<usize>) {
-        if track.is_some() {
-            self.count += 1;
-            self.are_several |= self.last.is_some() && self.last != track;
-            self.last = track;
-        }
-    }
-
-    /// The only one, if it is.
-    fn only(&self) -> Option<usize> {
-        self.last.filter(|_| !self.are_several)
     }
 }
 

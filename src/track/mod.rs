@@ -9,6 +9,8 @@
 
 mod assignment;
 
+mod claims;
+
 mod class;
 
 mod existence;
@@ -24,6 +26,8 @@ mod hypothesis;
 mod look;
 
 mod motion;
+
+mod nearby;
 
 mod nearest;
 

@@ -1,9 +1,13 @@
 //! One revolution for all tracks: what is whose, what is new, what is hidden, what is gone.
 
+use std::cmp::Reverse;
 use std::f64::consts::FRAC_PI_2;
 
-use super::assignment::Assigner;
+use nalgebra::Vector2;
+
+use super::assignment::{Assigner, Candidate};
 use super::grouping::Grouping;
+use super::nearby::Discs;
 use super::road_user::Track;
 use super::sight::Sight;
 use super::spots::Spot;
@@ -22,13 +26,14 @@ pub(super) struct ObjectTracker {
     objects: Vec<Object>,
     grouping: Grouping,
     outline: Vec<[f64; 2]>,
-    cost: Vec<f64>,
+    candidates: Vec<Candidate>,
     /// Pairs each track with a group.
     assigner: Assigner,
-    /// Where the tracks are.
-    known: Vec<Outline>,
-    /// The same when the groups are taken in, with their widths and how likely they exist.
-    places: Vec<(Rectangle, Outline, f64)>,
+    /// Places of the tracks, and how far they reach.
+    places: Vec<(Rectangle, Outline)>,
+    reaches: Discs,
+    /// How likely each track exists.
+    odds: Vec<f64>,
 }
 
 /// Returns of a single low layer that show a vehicle.
@@ -89,10 +94,11 @@ impl ObjectTracker {
         self.predict(scene, end);
         self.grouping
             .form(&self.tracks, clusters, scene, parameters);
-        self.pair(parameters);
+        let origin_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
+        self.pair(origin_m, parameters);
         self.update(scene, end);
-        self.begin(scene, end, parameters);
-        self.tidy(end, parameters);
+        self.begin(scene, end, origin_m, parameters);
+        self.tidy(end, origin_m, parameters);
         self.publish(end, parameters);
     }
 
@@ -109,34 +115,50 @@ impl ObjectTracker {
         }
     }
 
+    /// Takes over where the tracks are, each with what `more_m` lets it reach beyond its box.
+    fn take_places(&mut self, origin_m: Vector2<f64>, more_m: impl Fn(&Track) -> f64) {
+        self.places.clear();
+        self.reaches.begin(origin_m);
+        for track in &self.tracks {
+            let place = track.rectangle();
+            let reach_m = place.radius_m() + more_m(track);
+            self.reaches.push(place.centre_m.into(), reach_m);
+            self.places.push((place, place.outline()));
+        }
+    }
+
     /// The cheapest pairing of tracks with groups.
-    fn pair(&mut self, parameters: &TrackParameters) {
+    fn pair(&mut self, origin_m: Vector2<f64>, parameters: &TrackParameters) {
+        let leap_m = |track: &Track| {
+            FARTHEST_LEAP_M.min(parameters.association_distance_m + 2.0 * track.spread_m())
+        };
+        self.take_places(origin_m, leap_m);
         let groups = self.grouping.groups();
-        let (rows, columns) = (self.tracks.len(), groups.len());
-        let cost = &mut self.cost;
-        cost.clear();
-        cost.resize(rows * columns, f64::MAX);
-        for (row, track) in self.tracks.iter().enumerate() {
-            let outline = track.rectangle().outline();
-            let leap_m =
-                FARTHEST_LEAP_M.min(parameters.association_distance_m + 2.0 * track.spread_m());
-            for (column, group) in groups.iter().enumerate() {
-                let is_claimed = group.claimed_by == Some(row);
-                let is_near = || outline.distance_within_m(group.look.middle_m.into(), leap_m);
-                if !is_claimed && is_near().is_none() {
-                    continue;
+        self.candidates.clear();
+        for (column, group) in groups.iter().enumerate() {
+            let spots = self.grouping.spots(group);
+            // Costs may be below 0 by the bonus; all pairs are shifted alike.
+            let mut add = |row: usize, cost: f64| {
+                self.candidates.push(Candidate { row, column, cost });
+            };
+            if let Some(owner) = group.claimed_by {
+                add(owner, self.tracks[owner].cost(spots, &group.look));
+            }
+            let middle_m = group.look.middle_m;
+            for row in self.reaches.near(middle_m) {
+                let track = &self.tracks[row];
+                let (_, outline) = &self.places[row];
+                let is_near = outline
+                    .distance_within_m(middle_m.into(), leap_m(track))
+                    .is_some();
+                if is_near && group.claimed_by != Some(row) {
+                    add(row, track.cost(spots, &group.look) + CLAIM_BONUS);
                 }
-                let spots = self.grouping.spots(group);
-                let bonus = if is_claimed { CLAIM_BONUS } else { 0.0 };
-                cost[row * columns + column] = track.cost(spots, &group.look) - bonus;
             }
         }
-        // Costs may be below 0 by the bonus; all pairs are shifted alike.
-        for cost in cost.iter_mut() {
-            *cost += CLAIM_BONUS;
-        }
-        let most = GATE + CLAIM_BONUS;
-        self.assigner.assign(rows, columns, cost, most);
+        let size = (self.tracks.len(), groups.len());
+        self.assigner
+            .assign(size, &self.candidates, GATE + CLAIM_BONUS);
     }
 
     fn update(&mut self, scene: &Scene<'_>, end: Time) {
@@ -160,18 +182,23 @@ impl ObjectTracker {
     }
 
     /// New tracks from what no track explains.
-    fn begin(&mut self, scene: &Scene<'_>, end: Time, parameters: &TrackParameters) {
-        let outlines = self.tracks.iter().map(|track| track.rectangle().outline());
-        self.known.clear();
-        self.known.extend(outlines);
+    fn begin(
+        &mut self,
+        scene: &Scene<'_>,
+        end: Time,
+        origin_m: Vector2<f64>,
+        parameters: &TrackParameters,
+    ) {
+        self.take_places(origin_m, |_| 0.0);
         for (number, group) in self.grouping.groups().iter().enumerate() {
-            if self.assigner.pairs().contains(&Some(number)) || group.claimed_by.is_some() {
+            if group.claimed_by.is_some() || self.assigner.pairs().contains(&Some(number)) {
                 continue;
             }
+            let middle_m = group.look.middle_m;
             let is_piece = self
-                .known
-                .iter()
-                .any(|place| place.contains(group.look.middle_m.into()));
+                .reaches
+                .near(middle_m)
+                .any(|number| self.places[number].1.contains(middle_m.into()));
             let spots = self.grouping.spots(group);
             // Of a vehicle that is far away a single layer may show the bumper.
             let may_be_bumper = spots.len() >= BUMPER_RETURNS
@@ -197,33 +224,27 @@ impl ObjectTracker {
     }
 
     /// Drops what is gone, and the younger of two that stand in one place.
-    fn tidy(&mut self, end: Time, parameters: &TrackParameters) {
+    fn tidy(&mut self, end: Time, origin_m: Vector2<f64>, parameters: &TrackParameters) {
         self.lost.retain(|track| track.may_return(end));
         let gone = self
             .tracks
             .extract_if(.., |track| track.is_gone(parameters));
         self.lost.extend(gone.filter(|track| track.may_return(end)));
-        let places = &mut self.places;
-        places.clear();
-        places.extend(self.tracks.iter().map(|track| {
-            let place = track.rectangle();
-            (place, place.outline(), track.odds())
-        }));
+        self.take_places(origin_m, |_| 0.0);
+        self.odds.clear();
+        self.odds.extend(self.tracks.iter().map(Track::odds));
+        let (places, odds, reaches) = (&self.places, &self.odds, &mut self.reaches);
         let mut number = 0;
-        let doubled = self.tracks.extract_if(.., |track| {
+        let doubled = self.tracks.extract_if(.., |_| {
             let own = number;
             number += 1;
             let centre_m = places[own].0.centre_m;
-            let better = places.iter().enumerate().filter(|(other, (.., odds))| {
-                (*odds, std::cmp::Reverse(*other)) > (track.odds(), std::cmp::Reverse(own))
-            });
-            better
-                .filter(|(other, _)| *other != own)
-                .any(|(_, (place, outline, _))| {
-                    let depth_m = 0.3 * place.width_m.min(1.6);
-                    let distance_m = outline.distance_within_m(centre_m, 0.0);
-                    distance_m.is_some_and(|distance_m| distance_m < -depth_m)
-                })
+            reaches.near(centre_m.into()).any(|other| {
+                let is_better = (odds[other], Reverse(other)) > (odds[own], Reverse(own));
+                let (place, outline) = &places[other];
+                let depth_m = 0.3 * place.width_m.min(1.6);
+                is_better && outline.distance_m(centre_m) < -depth_m
+            })
         });
         self.lost
             .extend(doubled.filter(|track| track.may_return(end)));

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use multiversion::multiversion;
 
-use crate::float::{greatest, greatest_of, least, least_of};
+use crate::float::{greatest, least};
 
 /// A rectangle in the plane, seen from a sensor at the origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,7 +21,7 @@ pub struct Rectangle {
 }
 
 /// Directions that are tried within a quarter turn.
-const DIRECTIONS: usize = 30;
+const DIRECTIONS: usize = 32;
 /// Points that are looked at for the direction: more do not change it.
 const MOST_POINTS: usize = 96;
 /// Distance to an edge below which a point counts as on it.
@@ -70,6 +70,11 @@ impl Rectangle {
         }
     }
 
+    /// From its middle to its corners.
+    pub fn radius_m(&self) -> f64 {
+        0.5 * libm::hypot(self.length_m, self.width_m)
+    }
+
     /// Its corners, one after the other.
     pub fn corners(&self) -> [[f64; 2]; 4] {
         let (sine, cosine) = libm::sincos(self.yaw_rad);
@@ -82,13 +87,13 @@ impl Rectangle {
     /// The same, ready to measure many distances.
     pub fn outline(&self) -> Outline {
         let (sine, cosine) = libm::sincos(self.yaw_rad);
-        let half_m = [0.5 * self.length_m, 0.5 * self.width_m];
+        let half_m = [self.length_m, self.width_m].map(|side_m| 0.5 * side_m as f32);
         Outline {
             centre_m: self.centre_m,
             half_m,
             radius_m: half_m[0].abs() + half_m[1].abs(),
-            sine,
-            cosine,
+            sine: sine as f32,
+            cosine: cosine as f32,
         }
     }
 }
@@ -97,11 +102,11 @@ impl Rectangle {
 #[derive(Debug, Clone, Copy)]
 pub struct Outline {
     centre_m: [f64; 2],
-    half_m: [f64; 2],
+    half_m: [f32; 2],
     /// No corner is farther from the middle.
-    radius_m: f64,
-    sine: f64,
-    cosine: f64,
+    radius_m: f32,
+    sine: f32,
+    cosine: f32,
 }
 
 impl Outline {
@@ -115,7 +120,7 @@ impl Outline {
     /// looked at roughly.
     #[inline]
     pub fn distance_within_m(&self, at_m: [f64; 2], most_m: f64) -> Option<f64> {
-        let reach_m = self.radius_m + most_m;
+        let reach_m = f64::from(self.radius_m) + most_m;
         let is_far = |axis: usize| (at_m[axis] - self.centre_m[axis]).abs() > reach_m;
         if is_far(0) || is_far(1) {
             return None;
@@ -125,121 +130,108 @@ impl Outline {
     }
 
     /// Distance of a place from the edge, negative within.
-    pub fn distance_m(&self, [x, y]: [f64; 2]) -> f64 {
-        let offset = [x - self.centre_m[0], y - self.centre_m[1]];
-        let [along_m, across_m] = turned(&offset, self.sine, self.cosine);
-        let out = [
+    #[inline]
+    pub fn distance_m(&self, at_m: [f64; 2]) -> f64 {
+        f64::from(self.off_edge_m([0, 1].map(|axis| (at_m[axis] - self.centre_m[axis]) as f32)))
+    }
+
+    /// The same, by where the place is relative to the middle.
+    #[inline(always)]
+    pub(super) fn off_edge_m(&self, [x, y]: [f32; 2]) -> f32 {
+        let along_m = x * self.cosine + y * self.sine;
+        let across_m = y * self.cosine - x * self.sine;
+        let (along_m, across_m) = (
             along_m.abs() - self.half_m[0],
             across_m.abs() - self.half_m[1],
-        ];
-        if out[0] > 0.0 && out[1] > 0.0 {
-            libm::hypot(out[0], out[1])
-        } else {
-            out[0].max(out[1])
-        }
+        );
+        let (beyond_m, beside_m) = (greatest(along_m, 0.0), greatest(across_m, 0.0));
+        let outside_m = (beyond_m * beyond_m + beside_m * beside_m).sqrt();
+        outside_m + least(greatest(along_m, across_m), 0.0)
     }
 }
 
-/// Some of many points, by coordinates relative to the first one.
+/// Some of many points, relative to the first one.
 struct Sample {
-    /// Vectors of them that hold any.
-    vectors: usize,
-    x_m: [f32; MOST_POINTS],
-    y_m: [f32; MOST_POINTS],
-    /// 1 for each of them; what only fills the last vector counts nothing.
-    weight: [f32; MOST_POINTS],
+    count: usize,
+    points_m: [[f32; 2]; MOST_POINTS],
 }
-
-/// Points that are compared together.
-const TOGETHER: usize = 8;
 
 impl Sample {
     fn of(points_m: &[[f64; 2]]) -> Self {
         let stride = points_m.len().div_ceil(MOST_POINTS).max(1);
-        let first = points_m.first().copied().unwrap_or_default();
-        // What is not filled stands where the first point is, and widens no rectangle.
         let mut sample = Self {
-            vectors: points_m.len().div_ceil(stride).div_ceil(TOGETHER),
-            x_m: [0.0; MOST_POINTS],
-            y_m: [0.0; MOST_POINTS],
-            weight: [0.0; MOST_POINTS],
+            count: points_m.len().div_ceil(stride),
+            points_m: [[0.0; 2]; MOST_POINTS],
         };
-        for (place, [x, y]) in points_m.iter().step_by(stride).enumerate() {
-            sample.x_m[place] = (x - first[0]) as f32;
-            sample.y_m[place] = (y - first[1]) as f32;
-            sample.weight[place] = 1.0;
+        let some = points_m.iter().step_by(stride);
+        for (place, point_m) in sample.points_m.iter_mut().zip(some) {
+            *place = [0, 1].map(|axis| (point_m[axis] - points_m[0][axis]) as f32);
         }
         sample
     }
 
     /// The direction in which the points lie closest to the edges of their rectangle.
     fn closest_rad(&self) -> f64 {
-        tried_rad(closest(self, &TRIED))
+        let mut best = (f32::MIN, 0);
+        for (number, tried) in TRIED.iter().enumerate() {
+            let closeness = closeness(&self.points_m[..self.count], tried);
+            for (lane, closeness) in closeness.into_iter().enumerate() {
+                if closeness > best.0 {
+                    best = (closeness, number * TOGETHER + lane);
+                }
+            }
+        }
+        tried_rad(best.1)
     }
 }
 
-fn tried_rad(step: usize) -> f64 {
-    FRAC_PI_2 * step as f64 / DIRECTIONS as f64
-}
+/// Directions that are tried together.
+const TOGETHER: usize = 16;
 
-/// Sine and cosine of every direction that is tried.
-static TRIED: LazyLock<[(f32, f32); DIRECTIONS]> = LazyLock::new(|| {
-    std::array::from_fn(|step| {
-        let (sine, cosine) = libm::sincos(tried_rad(step));
-        (sine as f32, cosine as f32)
+/// Sines and cosines of some directions.
+type Directions = [[f32; TOGETHER]; 2];
+
+/// Those of all that are tried.
+static TRIED: LazyLock<[Directions; DIRECTIONS / TOGETHER]> = LazyLock::new(|| {
+    std::array::from_fn(|number| {
+        let turns: [_; TOGETHER] =
+            std::array::from_fn(|lane| libm::sincos(tried_rad(number * TOGETHER + lane)));
+        [
+            turns.map(|turn| turn.0 as f32),
+            turns.map(|turn| turn.1 as f32),
+        ]
     })
 });
 
-/// The number of the direction in which points lie closest to the edges of their rectangle.
-/// Written so that it vectorises.
-#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-fn closest(sample: &Sample, tried: &[(f32, f32); DIRECTIONS]) -> usize {
-    let mut turned = [[[0.0; TOGETHER]; 2]; MOST_POINTS / TOGETHER];
-    let mut best = (f32::MIN, 0);
-    for (step, (sine, cosine)) in tried.iter().enumerate() {
-        let closeness = closeness(sample, *sine, *cosine, &mut turned);
-        if closeness > best.0 {
-            best = (closeness, step);
-        }
-    }
-    best.1
+fn tried_rad(number: usize) -> f64 {
+    FRAC_PI_2 * number as f64 / DIRECTIONS as f64
 }
 
-/// How close points lie to the edges of their rectangle in a direction: the sum of 1/distance.
-/// `turned` is for their coordinates in it.
-#[inline(always)]
-fn closeness(
-    sample: &Sample,
-    sine: f32,
-    cosine: f32,
-    turned: &mut [[[f32; TOGETHER]; 2]; MOST_POINTS / TOGETHER],
-) -> f32 {
-    let ([mut low_u, mut low_v], [mut high_u, mut high_v]) =
-        ([[f32::MAX; TOGETHER]; 2], [[f32::MIN; TOGETHER]; 2]);
-    let (x_m, _) = sample.x_m.as_chunks::<TOGETHER>();
-    let (y_m, _) = sample.y_m.as_chunks::<TOGETHER>();
-    let (weight, _) = sample.weight.as_chunks::<TOGETHER>();
-    let count = sample.vectors.min(x_m.len());
-    for vector in 0..count {
+/// How close points lie to the edges of their rectangle, for each of some directions: the sum of
+/// 1/distance.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn closeness(points_m: &[[f32; 2]], [sine, cosine]: &Directions) -> [f32; TOGETHER] {
+    let (mut low_u, mut low_v) = ([f32::MAX; TOGETHER], [f32::MAX; TOGETHER]);
+    let (mut high_u, mut high_v) = ([f32::MIN; TOGETHER], [f32::MIN; TOGETHER]);
+    for [x, y] in points_m {
         for lane in 0..TOGETHER {
-            let (x, y) = (x_m[vector][lane], y_m[vector][lane]);
-            let (u, v) = (x * cosine + y * sine, y * cosine - x * sine);
-            (turned[vector][0][lane], turned[vector][1][lane]) = (u, v);
+            let u = x * cosine[lane] + y * sine[lane];
+            let v = y * cosine[lane] - x * sine[lane];
             (low_u[lane], high_u[lane]) = (least(low_u[lane], u), greatest(high_u[lane], u));
             (low_v[lane], high_v[lane]) = (least(low_v[lane], v), greatest(high_v[lane], v));
         }
     }
-    let (low_u, high_u) = (least_of(low_u), greatest_of(high_u));
-    let (low_v, high_v) = (least_of(low_v), greatest_of(high_v));
-    let mut sums = [0.0f32; TOGETHER];
-    for vector in 0..count {
+    let mut sums = [0.0; TOGETHER];
+    for [x, y] in points_m {
         for lane in 0..TOGETHER {
-            let (u, v) = (turned[vector][0][lane], turned[vector][1][lane]);
-            let edge_m = least(least(u - low_u, high_u - u), least(v - low_v, high_v - v));
-            sums[lane] += weight[vector][lane] / greatest(edge_m, NEAREST_M);
+            let u = x * cosine[lane] + y * sine[lane];
+            let v = y * cosine[lane] - x * sine[lane];
+            let along_m = least(u - low_u[lane], high_u[lane] - u);
+            let across_m = least(v - low_v[lane], high_v[lane] - v);
+            sums[lane] += 1.0 / greatest(least(along_m, across_m), NEAREST_M);
         }
     }
-    sums.iter().sum()
+    sums
 }
 
 /// Least and greatest coordinates along and across a direction.

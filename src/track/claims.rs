@@ -1,0 +1,152 @@
+//! Which returns of a patch lie in the places of known tracks.
+
+use multiversion::multiversion;
+
+use super::Outline;
+use super::forecast::Forecasts;
+use super::placing::Placed;
+
+/// For every return of a patch the track that has it. Its buffers are made once.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Claims {
+    /// Distance from the edge of that track's box, negative within.
+    distances_m: Vec<f32>,
+    /// The number of the track, or [`NOBODY`].
+    owners: Vec<u32>,
+}
+
+const NOBODY: u32 = u32::MAX;
+/// In structure only what is well within the box of a track may be its own.
+const STRUCTURE_MARGIN_M: f32 = 0.15;
+
+impl Claims {
+    /// Gives every return of a patch to the nearest of the tracks `near` it that can have a return
+    /// there; of equally near ones to the first. Less is theirs in structure than in what
+    /// `is_whole`, a road user from end to end.
+    pub(super) fn settle(
+        &mut self,
+        placed: &[Placed],
+        near: &[usize],
+        forecasts: &Forecasts,
+        is_whole: bool,
+    ) {
+        self.distances_m.clear();
+        self.distances_m.resize(placed.len(), f32::INFINITY);
+        self.owners.clear();
+        self.owners.resize(placed.len(), NOBODY);
+        for track in near {
+            let forecast = forecasts.of(*track);
+            let margin_m = if is_whole {
+                forecast.margin_m
+            } else {
+                STRUCTURE_MARGIN_M
+            };
+            claim(
+                placed,
+                (&forecast.outline, forecast.middle_m, margin_m),
+                *track as u32,
+                (&mut self.distances_m, &mut self.owners),
+            );
+        }
+    }
+
+    /// The owner of every return, in their order.
+    pub(super) fn owners(&self) -> impl Iterator<Item = Option<usize>> + use<'_> {
+        let owners = self.owners.iter();
+        owners.map(|owner| (*owner != NOBODY).then_some(*owner as usize))
+    }
+
+    /// The only track that has any of the returns, and the share of them that it has.
+    pub(super) fn only(&self) -> Option<(usize, f64)> {
+        let mut owners = self.owners().flatten();
+        let first = owners.next()?;
+        let mut count = 1;
+        for other in owners {
+            if other != first {
+                return None;
+            }
+            count += 1;
+        }
+        Some((first, f64::from(count) / self.owners.len() as f64))
+    }
+}
+
+/// Gives a track the returns that lie nearer to its box than to any before.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn claim(
+    placed: &[Placed],
+    (outline, [x_m, y_m], margin_m): (&Outline, [f32; 2], f32),
+    track: u32,
+    (distances_m, owners): (&mut [f32], &mut [u32]),
+) {
+    let (distances_m, owners) = (
+        &mut distances_m[..placed.len()],
+        &mut owners[..placed.len()],
+    );
+    for place in 0..placed.len() {
+        let [x, y] = placed[place].at_m;
+        let distance_m = outline.off_edge_m([x - x_m, y - y_m]);
+        let is_nearer = (distance_m <= margin_m) & (distance_m < distances_m[place]);
+        let (before_m, owner) = (distances_m[place], owners[place]);
+        distances_m[place] = if is_nearer { distance_m } else { before_m };
+        owners[place] = if is_nearer { track } else { owner };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::Rectangle;
+    use crate::track::forecast::Forecast;
+
+    fn at(x: f32) -> Placed {
+        Placed {
+            at_m: [x, 0.0],
+            ..Placed::default()
+        }
+    }
+
+    /// Two boxes of 2 m by 2 m, 4 m apart from middle to middle.
+    fn forecasts() -> Forecasts {
+        let boxes = [0.0, 4.0].map(|x| {
+            let place = Rectangle {
+                centre_m: [100.0 + x, 50.0],
+                yaw_rad: 0.0,
+                length_m: 2.0,
+                width_m: 2.0,
+            };
+            Forecast {
+                outline: place.outline(),
+                middle_m: [x as f32, 0.0],
+                margin_m: 1.2,
+                most_m: [2.0; 2],
+                yaw_rad: 0.0,
+            }
+        });
+        Forecasts::from(boxes.to_vec())
+    }
+
+    fn owners(placed: &[Placed], is_whole: bool) -> (Vec<Option<usize>>, Option<(usize, f64)>) {
+        let mut claims = Claims::default();
+        claims.settle(placed, &[0, 1], &forecasts(), is_whole);
+        (claims.owners().collect(), claims.only())
+    }
+
+    #[test]
+    fn the_nearest_track_has_a_return_and_the_first_of_two_as_near() {
+        let placed = [0.0, 1.9, 2.0, 2.1, 4.0, 6.1, 6.3].map(at);
+        let expected = [Some(0), Some(0), Some(0), Some(1), Some(1), Some(1), None];
+        assert_eq!(owners(&placed, true), (expected.to_vec(), None));
+        let in_structure = [Some(0), None, None, None, Some(1), None, None];
+        assert_eq!(owners(&placed, false), (in_structure.to_vec(), None));
+    }
+
+    #[test]
+    fn the_only_owner_is_known_with_its_share() {
+        assert_eq!(
+            owners(&[-5.0, 0.0, 0.5, 1.0].map(at), true).1,
+            Some((0, 0.75))
+        );
+        assert_eq!(owners(&[-5.0].map(at), true).1, None);
+    }
+}
