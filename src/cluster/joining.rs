@@ -105,12 +105,10 @@ impl Joiner {
         let ranges_m =
             run.nearest_m() - eps_far_m - ROUNDING_M..run.farthest_m() + eps_far_m + ROUNDING_M;
         let mut set = self.partition.find(own);
-        for other in layer..MAX_LAYERS {
-            let Some(reach) = core.windows.reach(layer, other, cone) else {
-                break;
-            };
-            let runs = self.runs.of_layer(other);
-            for stretch in core.windows.around(&run.columns(), reach) {
+        let (layers, reach) = core.windows.extent(layer, cone);
+        for stretch in core.windows.around(&run.columns(), reach) {
+            for other in layer..layers.end {
+                let runs = self.runs.of_layer(other);
                 let mut at = self.runs.first_behind(stretch.start, other);
                 if other == layer {
                     // Those before it have seen it.

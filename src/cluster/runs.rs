@@ -32,7 +32,7 @@ const AXES: usize = 4;
 const RANGE: usize = 3;
 
 /// Columns for which it is noted together how many runs begin before them.
-const BLOCK: usize = 16;
+const BLOCK: usize = 8;
 
 /// No run of any point has the number of none.
 const _: () = assert!(CAPACITY < Runs::NONE as usize);

@@ -93,17 +93,6 @@ impl Windows {
         }
     }
 
-    /// How many columns to either side of a point in `layer` can hold a neighbour of it in
-    /// `other`; `None` if none can, however far.
-    #[inline]
-    pub(super) fn reach(&self, layer: usize, other: usize, cone: Cone) -> Option<usize> {
-        if self.setting == WindowSetting::Columns {
-            return Some(self.fixed_columns());
-        }
-        let chord_squared = self.chord_squared(layer, other, cone);
-        (chord_squared >= 0.0).then(|| self.columns_on(chord_squared))
-    }
-
     /// The layers that can hold neighbours of a point in a layer, and how many columns to either
     /// side of it.
     pub(super) fn extent(&self, layer: usize, cone: Cone) -> (Range<usize>, usize) {
@@ -249,24 +238,24 @@ mod tests {
     }
 
     #[test]
-    fn the_reach_shrinks_with_range_and_with_the_distance_of_layers() {
+    fn the_extent_shrinks_with_range() {
         let windows = windows(1800, Profile::Default);
-        let reach = |other, range_m| windows.reach(8, other, Cone::around(range_m, 0.5));
-        let own = reach(8, 10.0).unwrap();
-        assert!((15..=18).contains(&own), "{own}");
-        assert!(reach(9, 10.0).unwrap() < own);
-        assert_eq!(reach(10, 10.0), None);
-        assert!(reach(8, 40.0).unwrap() <= 6);
-        assert_eq!(reach(0, 0.4), Some(900));
+        let extent = |range_m| windows.extent(8, Cone::around(range_m, 0.5));
+        let (layers, reach) = extent(10.0);
+        // Layers are 2 degrees apart, and 0.5 m are 2.9 degrees.
+        assert_eq!(layers, 7..10);
+        assert!((15..=18).contains(&reach), "{reach}");
+        let (layers, reach) = extent(40.0);
+        assert_eq!(layers, 8..9);
+        assert!(reach <= 6, "{reach}");
+        assert_eq!(extent(0.4), (0..16, 900));
     }
 
     #[test]
     fn the_thesis_looks_at_eighty_candidates() {
         let windows = windows(1800, Profile::Thesis);
-        let reaches: Vec<_> = (0..16)
-            .map(|other| windows.reach(3, other, Cone::around(20.0, 1.8)))
-            .collect();
-        assert_eq!(reaches, [Some(2); 16]);
+        let extent = windows.extent(3, Cone::around(20.0, 1.8));
+        assert_eq!(extent, (0..16, 2));
         assert_eq!(windows.stretches(100, 2, 2)[0].len() * 16, 80);
     }
 }
