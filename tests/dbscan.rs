@@ -107,13 +107,21 @@ fn are_neighbours(scan: &Scan, parameters: &ClusterParameters, a: usize, b: usiz
     squared_distance(scan, a, b) <= eps * eps
 }
 
-/// Clusters are the components of core points; a border point belongs to that of its nearest
+/// Ground and what is too high above it, which lies 2 m below the sensor, are left out. Clusters are
+/// the components of core points; a border point belongs to that of its nearest
 /// core neighbour; everything else is noise.
 fn assert_is_dbscan(scan: &Scan, ground: &[bool], parameters: &ClusterParameters) -> usize {
+    let heights_m: Vec<f32> = scan.z_m().iter().map(|z| z + 2.0).collect();
     let clusters = Dbscan::new(parameters)
-        .process(scan, ground, &vec![0.0; scan.len()])
+        .process(scan, ground, &heights_m)
         .clone();
-    let truth = BruteForce::new(scan, ground, parameters);
+    let is_too_high = |height_m: &f32| f64::from(*height_m) > parameters.highest_m;
+    let heights = heights_m.iter().map(is_too_high);
+    let left_out: Vec<bool> = ground.iter().zip(heights).map(|(a, b)| *a || b).collect();
+    for (point, _) in left_out.iter().enumerate().filter(|(_, is_out)| **is_out) {
+        assert_eq!(clusters.labels()[point], Clusters::NONE);
+    }
+    let truth = BruteForce::new(scan, &left_out, parameters);
     let mut component_of_cluster = vec![usize::MAX; clusters.len()];
     for point in truth.points.iter().copied() {
         let label = clusters.labels()[point];
