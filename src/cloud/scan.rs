@@ -238,6 +238,16 @@ impl Scan {
         column * MAX_LAYERS + layer
     }
 
+    /// The column that is counted beyond the last one, but not twice around: a division would take
+    /// longer than what is looked up there.
+    pub const fn over_seam(&self, column: usize) -> usize {
+        if column < self.columns {
+            column
+        } else {
+            column - self.columns
+        }
+    }
+
     /// The column of a point.
     pub const fn column(&self, point: usize) -> usize {
         point / MAX_LAYERS

@@ -39,7 +39,7 @@ pub(super) fn mark_returns(
     let columns = scan.columns();
     let (first, count) = scan.columns_across(&corners).unwrap_or((0, columns));
     let outline = object.rectangle().outline();
-    for column in (first..first + count).map(|column| column % columns) {
+    for column in (first..first + count).map(|column| scan.over_seam(column)) {
         let age_s = scan.age_s(column);
         for point in (0..MAX_LAYERS).map(|layer| scan.index(column, layer)) {
             if scan.has_return(point) {

@@ -283,7 +283,7 @@ impl Ground {
             return;
         };
         let outline = vehicle.outline();
-        for column in (first..first + count).map(|column| column % scan.columns()) {
+        for column in (first..first + count).map(|column| scan.over_seam(column)) {
             for layer in 0..MAX_LAYERS {
                 let point = scan.index(column, layer);
                 let [x, y, _] = scan.point_m(point).map(f64::from);

@@ -362,8 +362,8 @@ fn roughness_m(spots: &[Spot], scan: &Scan) -> f64 {
     for spot in spots.iter().step_by(stride) {
         let point = spot.point as usize;
         let (column, layer) = (scan.column(point), scan.layer(point));
-        let before = ranges[scan.index((column + columns - 1) % columns, layer)];
-        let after = ranges[scan.index((column + 1) % columns, layer)];
+        let before = ranges[scan.index(scan.over_seam(column + columns - 1), layer)];
+        let after = ranges[scan.index(scan.over_seam(column + 1), layer)];
         let here = ranges[point];
         let near = |other: f32| other > 0.0 && (other - here).abs() < EDGE_M;
         if near(before) && near(after) {

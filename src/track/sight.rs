@@ -50,7 +50,7 @@ impl Sight {
         };
         let stride = count.div_ceil(MOST_COLUMNS).max(1);
         for step in (0..count).step_by(stride) {
-            let column = (first + step) % scan.columns();
+            let column = scan.over_seam(first + step);
             let direction = scan.direction(column).map(f64::from);
             let Some(below_belt) = crossing(&corners, direction) else {
                 continue;
