@@ -120,11 +120,11 @@ impl Placing {
     /// Height above the ground of what the rays directly above its own ones met at about the same
     /// range, be it of the cluster or not; minus infinity if there is nothing.
     pub(super) fn goes_on_to_m(&self, scene: &Scene<'_>) -> f32 {
-        let ranges_m = scene.scan.range_m();
-        let above = self.point[..self.count].iter().zip(self.range_m());
-        let above = above.filter_map(|(point, range_m)| {
+        let scan = scene.scan;
+        let own = self.point[..self.count].iter().zip(self.range_m());
+        let above = own.filter_map(|(point, range_m)| {
             let above = *point as usize + 1;
-            let goes_on = (ranges_m.get(above)? - range_m).abs() < SAME_M;
+            let goes_on = scan.layer(above) > 0 && (scan.range_m()[above] - range_m).abs() < SAME_M;
             goes_on.then(|| scene.heights_m[above])
         });
         above.fold(f32::NEG_INFINITY, greatest)
