@@ -107,8 +107,8 @@ fn are_neighbours(scan: &Scan, parameters: &ClusterParameters, a: usize, b: usiz
     squared_distance(scan, a, b) <= eps * eps
 }
 
-/// Ground and what is too high above it, which lies 2 m below the sensor, are left out. Clusters are
-/// the components of core points; a border point belongs to that of its nearest
+/// The ground, which lies 2 m below the sensor, and what is too high above it are left out.
+/// Clusters are the components of core points; a border point belongs to that of its nearest
 /// core neighbour; everything else is noise.
 fn assert_is_dbscan(scan: &Scan, ground: &[bool], parameters: &ClusterParameters) -> usize {
     let heights_m: Vec<f32> = scan.z_m().iter().map(|z| z + 2.0).collect();

@@ -1,4 +1,5 @@
-//! Step four: returns above the ground that belong together (thesis section 4.1.2).
+//! Step four: returns that belong together, of those above the ground (thesis section 4.1.2) and not
+//! above all road users.
 //!
 //! DBSCAN (Ester et al. 1996) without a tree: the array is sorted by azimuth and elevation
 //! already, so that the neighbours of a point stand in a few columns of it. `density` counts those

@@ -17,8 +17,6 @@ pub(super) struct Assigner {
     pairs: Vec<Option<usize>>,
     /// Which rows, and behind them which columns, candidates connect.
     connected: Partition,
-    /// The candidates, those of each part side by side.
-    candidates: Vec<Candidate>,
     /// The part that is solved: its rows, its columns, and their costs.
     rows: Vec<usize>,
     columns: Vec<usize>,
@@ -30,28 +28,27 @@ impl Assigner {
     /// Pairs rows with columns so that the sum of costs is least. Other pairs than the candidates
     /// that cost less than `forbidden` are never made, and leaving a row alone costs `forbidden`.
     /// Among equally cheap pairings the one is taken in which lower rows have lower columns.
+    /// The candidates are sorted, and those that are none are dropped.
     ///
     /// Rows and columns that no candidates connect do not concern each other: each such part is
     /// solved for itself.
     pub(super) fn assign(
         &mut self,
         (rows, columns): (usize, usize),
-        candidates: &[Candidate],
+        candidates: &mut Vec<Candidate>,
         forbidden: f64,
     ) -> &[Option<usize>] {
         refill(&mut self.pairs, rows, None);
         self.connected.reset(rows + columns);
-        self.candidates.clear();
-        for candidate in candidates.iter().filter(|pair| pair.cost < forbidden) {
-            let (row, column) = (candidate.row as u32, (rows + candidate.column) as u32);
+        candidates.retain(|pair| pair.cost < forbidden);
+        for pair in candidates.iter() {
+            let (row, column) = (pair.row as u32, (rows + pair.column) as u32);
             self.connected.join(row, column);
-            self.candidates.push(*candidate);
         }
         self.connected.flatten();
         let part_of = |candidate: &Candidate| self.connected.parents()[candidate.row];
-        self.candidates
-            .sort_unstable_by_key(|pair| (part_of(pair), pair.row, pair.column));
-        for part in self.candidates.chunk_by(|a, b| part_of(a) == part_of(b)) {
+        candidates.sort_unstable_by_key(|pair| (part_of(pair), pair.row, pair.column));
+        for part in candidates.chunk_by(|a, b| part_of(a) == part_of(b)) {
             sort_out(&mut self.rows, part.iter().map(|pair| pair.row));
             sort_out(&mut self.columns, part.iter().map(|pair| pair.column));
             let size = (self.rows.len(), self.columns.len());
@@ -244,7 +241,7 @@ mod tests {
                 .map(|_| 12.0 * random.uniform())
                 .collect();
             let mut assigner = Assigner::default();
-            let pairs = assigner.assign((rows, columns), &candidates(columns, &cost), 8.0);
+            let pairs = assigner.assign((rows, columns), &mut candidates(columns, &cost), 8.0);
             let sum: f64 = pairs
                 .iter()
                 .enumerate()
@@ -270,7 +267,7 @@ mod tests {
             };
             let cost: Vec<f64> = (0..rows * columns).map(|_| price()).collect();
             let mut assigner = Assigner::default();
-            let by_parts = assigner.assign((rows, columns), &candidates(columns, &cost), 8.0);
+            let by_parts = assigner.assign((rows, columns), &mut candidates(columns, &cost), 8.0);
             let mut all = Part::default();
             assert_eq!(by_parts, all.solve((rows, columns), &cost, 8.0));
         }
@@ -281,7 +278,7 @@ mod tests {
         // Row 0 is a little nearer to column 0, row 1 can have nothing else.
         let cost = [1.0, 1.5, 2.0, 100.0];
         let mut assigner = Assigner::default();
-        let pairs = assigner.assign((2, 2), &candidates(2, &cost), 10.0);
+        let pairs = assigner.assign((2, 2), &mut candidates(2, &cost), 10.0);
         assert_eq!(pairs, [Some(1), Some(0)]);
     }
 }

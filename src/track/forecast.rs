@@ -24,10 +24,10 @@ const LEAST_MARGIN_M: f64 = 0.25;
 const MOST_MARGIN_M: f64 = 0.9;
 
 impl Forecast {
-    fn of(track: &Track, place: &Rectangle, origin_m: Vector2<f64>) -> Self {
+    fn of(track: &Track, place: &Rectangle, middle_m: [f32; 2]) -> Self {
         Self {
             outline: place.outline(),
-            middle_m: [0, 1].map(|axis| (place.centre_m[axis] - origin_m[axis]) as f32),
+            middle_m,
             margin_m: (LEAST_MARGIN_M + track.spread_m()).min(MOST_MARGIN_M) as f32,
             most_m: track.most_m(),
             yaw_rad: track.yaw_rad(),
@@ -50,9 +50,10 @@ impl Forecasts {
         self.reaches.begin(origin_m);
         for track in tracks {
             let place = track.rectangle();
-            let forecast = Forecast::of(track, &place, origin_m);
+            let centre_m = place.centre_m.into();
+            let forecast = Forecast::of(track, &place, self.reaches.relative_m(centre_m));
             let reach_m = place.radius_m() + f64::from(forecast.margin_m);
-            self.reaches.push(place.centre_m.into(), reach_m);
+            self.reaches.push(centre_m, reach_m);
             self.forecasts.push(forecast);
         }
     }

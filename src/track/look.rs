@@ -263,8 +263,17 @@ impl View {
     }
 }
 
-/// Difference of ranges within which the return of the next layer is of the same thing.
-pub(super) const SAME_M: f32 = 0.8;
+/// The return directly above one, if it is there and of the same thing.
+pub(super) fn same_above(scan: &Scan, point: usize) -> Option<usize> {
+    /// Difference of ranges within which it is.
+    const SAME_M: f32 = 0.8;
+    let ranges_m = scan.range_m();
+    let above = point + 1;
+    let is_same = scan.layer(above) > 0
+        && ranges_m[above] > 0.0
+        && (ranges_m[above] - ranges_m[point]).abs() < SAME_M;
+    is_same.then_some(above)
+}
 
 /// Whether something nearer hides what is above a point.
 fn is_covered(scan: &Scan, point: usize) -> bool {
@@ -282,9 +291,8 @@ fn goes_on(spots: &[Spot], scan: &Scan) -> f64 {
             .get(number + 1)
             .is_none_or(|next| scan.column(next.point as usize) != scan.column(point));
         if is_top && scan.layer(point) + 1 < MAX_LAYERS {
-            let above_m = scan.range_m()[point + 1];
             columns += 1;
-            on += u32::from(above_m > 0.0 && (above_m - scan.range_m()[point]).abs() < SAME_M);
+            on += u32::from(same_above(scan, point).is_some());
         }
     }
     f64::from(on) / f64::from(columns.max(1))

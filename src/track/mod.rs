@@ -1,8 +1,9 @@
 //! Step five: clusters become objects that keep their identity from revolution to revolution.
 //!
 //! `objects` takes a revolution in: `patches` takes its returns, by `placing` them, and parts what
-//! does not touch on the `floor`, `grouping` says which `spots` belong together, given the `forecast` of each track
-//! and `strays` near it, `assignment` what is whose, `sight` what is hidden and what is gone. A
+//! does not touch on the `floor`, `grouping` says which `spots` belong together, given what each
+//! track `claims` by its `forecast` and the `strays` near it, `assignment` what is whose, `sight`
+//! what is hidden and what is gone; `nearby` spares all of them what is far away. A
 //! `road_user` learns from each `look` its `motion`, its `shape`, its `class`, and by its `trail`
 //! whether it moves; `existence` says whether it is there at all; and one that was lost gets its id
 //! back (`road_user`). `nearest` is the tracking of the thesis.

@@ -158,7 +158,7 @@ impl ObjectTracker {
         }
         let size = (self.tracks.len(), groups.len());
         self.assigner
-            .assign(size, &self.candidates, GATE + CLAIM_BONUS);
+            .assign(size, &mut self.candidates, GATE + CLAIM_BONUS);
     }
 
     fn update(&mut self, scene: &Scene<'_>, end: Time) {

@@ -1,7 +1,7 @@
 //! The returns of one cluster, placed, coordinate by coordinate.
 
 use super::Scene;
-use super::look::SAME_M;
+use super::look::same_above;
 use crate::ego::Placement;
 use crate::float::{bounds_of, greatest, least};
 
@@ -117,17 +117,13 @@ impl Placing {
         }
     }
 
-    /// Height above the ground of what the rays directly above its own ones met at about the same
-    /// range, be it of the cluster or not; minus infinity if there is nothing.
+    /// Height above the ground to which it goes on in the returns directly above its own ones, be
+    /// they of the cluster or not; minus infinity if there are none.
     pub(super) fn goes_on_to_m(&self, scene: &Scene<'_>) -> f32 {
-        let scan = scene.scan;
-        let own = self.point[..self.count].iter().zip(self.range_m());
-        let above = own.filter_map(|(point, range_m)| {
-            let above = *point as usize + 1;
-            let goes_on = scan.layer(above) > 0 && (scan.range_m()[above] - range_m).abs() < SAME_M;
-            goes_on.then(|| scene.heights_m[above])
-        });
-        above.fold(f32::NEG_INFINITY, greatest)
+        let own = self.point.iter();
+        let above = own.filter_map(|point| same_above(scene.scan, *point as usize));
+        let heights_m = above.map(|above| scene.heights_m[above]);
+        heights_m.fold(f32::NEG_INFINITY, greatest)
     }
 
     /// Where they are from above.

@@ -1,6 +1,7 @@
 //! Boxes around what a sensor sees of an object: one or two of its sides.
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::ops::{Add, Mul, Sub};
 use std::sync::LazyLock;
 
 use multiversion::multiversion;
@@ -21,7 +22,9 @@ pub struct Rectangle {
 }
 
 /// Directions that are tried within a quarter turn.
-const DIRECTIONS: usize = 32;
+const DIRECTIONS: usize = 2 * TOGETHER;
+/// Those that are tried together.
+const TOGETHER: usize = 16;
 /// Points that are looked at for the direction: more do not change it.
 const MOST_POINTS: usize = 96;
 /// Distance to an edge below which a point counts as on it.
@@ -137,9 +140,8 @@ impl Outline {
 
     /// The same, by where the place is relative to the middle.
     #[inline(always)]
-    pub(super) fn off_edge_m(&self, [x, y]: [f32; 2]) -> f32 {
-        let along_m = x * self.cosine + y * self.sine;
-        let across_m = y * self.cosine - x * self.sine;
+    pub(super) fn off_edge_m(&self, offset_m: [f32; 2]) -> f32 {
+        let [along_m, across_m] = turned(&offset_m, self.sine, self.cosine);
         let (along_m, across_m) = (
             along_m.abs() - self.half_m[0],
             across_m.abs() - self.half_m[1],
@@ -185,9 +187,6 @@ impl Sample {
     }
 }
 
-/// Directions that are tried together.
-const TOGETHER: usize = 16;
-
 /// Sines and cosines of some directions.
 type Directions = [[f32; TOGETHER]; 2];
 
@@ -213,19 +212,17 @@ fn tried_rad(number: usize) -> f64 {
 fn closeness(points_m: &[[f32; 2]], [sine, cosine]: &Directions) -> [f32; TOGETHER] {
     let (mut low_u, mut low_v) = ([f32::MAX; TOGETHER], [f32::MAX; TOGETHER]);
     let (mut high_u, mut high_v) = ([f32::MIN; TOGETHER], [f32::MIN; TOGETHER]);
-    for [x, y] in points_m {
+    for point_m in points_m {
         for lane in 0..TOGETHER {
-            let u = x * cosine[lane] + y * sine[lane];
-            let v = y * cosine[lane] - x * sine[lane];
+            let [u, v] = turned(point_m, sine[lane], cosine[lane]);
             (low_u[lane], high_u[lane]) = (least(low_u[lane], u), greatest(high_u[lane], u));
             (low_v[lane], high_v[lane]) = (least(low_v[lane], v), greatest(high_v[lane], v));
         }
     }
     let mut sums = [0.0; TOGETHER];
-    for [x, y] in points_m {
+    for point_m in points_m {
         for lane in 0..TOGETHER {
-            let u = x * cosine[lane] + y * sine[lane];
-            let v = y * cosine[lane] - x * sine[lane];
+            let [u, v] = turned(point_m, sine[lane], cosine[lane]);
             let along_m = least(u - low_u[lane], high_u[lane] - u);
             let across_m = least(v - low_v[lane], high_v[lane] - v);
             sums[lane] += 1.0 / greatest(least(along_m, across_m), NEAREST_M);
@@ -264,8 +261,11 @@ impl Extent {
 
 /// A point's coordinates along and across a direction.
 #[inline(always)]
-pub(super) fn turned([x, y]: &[f64; 2], sine: f64, cosine: f64) -> [f64; 2] {
-    [x * cosine + y * sine, y * cosine - x * sine]
+pub(super) fn turned<T>([x, y]: &[T; 2], sine: T, cosine: T) -> [T; 2]
+where
+    T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>,
+{
+    [*x * cosine + *y * sine, *y * cosine - *x * sine]
 }
 
 #[cfg(test)]
