@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use super::density::Density;
-use super::joining::{Core, Joiner};
+use super::joining::Joiner;
 use super::returns::{Centre, FARTHEST, Returns, nearer};
-use super::runs::Runs;
+use super::runs::{Core, Runs};
 use super::window::{Cone, Windows};
 use super::{ClusterParameters, Clusters};
 use crate::cloud::Scan;
@@ -100,8 +100,8 @@ impl Dbscan {
                 self.numbers.push(self.numbers[*first as usize]);
             }
         }
-        for (_, run) in runs.iter() {
-            ends[self.numbers[usize::from(run.number)] as usize] += run.columns.len();
+        for (run, number) in runs.all().iter().zip(&self.numbers) {
+            ends[*number as usize] += run.columns().len();
         }
     }
 

@@ -5,7 +5,10 @@
 //! already, so that the neighbours of a point stand in a few columns of it. `density` counts those
 //! close by, which is enough for most points; `window` says in which columns and layers all others
 //! can be, and `returns` compares points there; `dbscan` is the algorithm, `joining` says which
-//! core points belong together, by way of `runs`.
+//! core points belong together: those that follow each other are `runs`, those that meet are `sets`
+//! of runs, and of sets only those whose `boxes` are near each other are looked at closer.
+
+mod boxes;
 
 mod dbscan;
 
@@ -16,6 +19,8 @@ mod joining;
 mod returns;
 
 mod runs;
+
+mod sets;
 
 mod window;
 

@@ -4,98 +4,89 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
+use super::ClusterParameters;
+use super::boxes::{AXES, Bounds};
 use super::density::Density;
 use super::returns::Returns;
-use crate::cloud::{CAPACITY, MAX_COLUMNS, MAX_LAYERS};
+use super::window::{Cone, Windows};
+use crate::cloud::{CAPACITY, MAX_LAYERS};
 use crate::float::{greatest, least};
+
+/// What is known of a revolution's core points before they are joined.
+#[derive(Clone, Copy)]
+pub(super) struct Core<'a> {
+    pub(super) parameters: &'a ClusterParameters,
+    pub(super) windows: &'a Windows,
+    /// Nothing but core points is looked at.
+    pub(super) returns: Returns<'a>,
+}
 
 /// Core points of one layer in columns that follow each other, each a neighbour of the one before.
 #[derive(Debug, Clone)]
 pub(super) struct Run {
-    /// Counts the runs of all layers, in the order in which the array has their first points. There
-    /// are no more than points, so that 16 bits hold it.
-    pub(super) number: u16,
-    pub(super) columns: Range<u16>,
-    /// The place in its layer where the runs end that follow it and are known to belong to its set.
-    alike_until: u16,
-    /// Least x, y, z and range of its points.
-    pub(super) low_m: Corner,
-    /// The greatest ones.
-    pub(super) high_m: Corner,
+    layer: u8,
+    columns: Range<u16>,
+    /// Around its points.
+    pub(super) bounds: Bounds,
 }
-
-/// A corner of a box around points: x, y, z, and range.
-type Corner = [f32; AXES];
-
-const AXES: usize = 4;
-/// The place of the range in a corner.
-const RANGE: usize = 3;
-
-/// Columns for which it is noted together how many runs begin before them.
-const BLOCK: usize = 8;
 
 /// No run of any point has the number of none.
 const _: () = assert!(CAPACITY < Runs::NONE as usize);
 
 impl Run {
-    /// Range of its nearest point.
-    pub(super) fn nearest_m(&self) -> f32 {
-        self.low_m[RANGE]
-    }
-
-    /// Range of its farthest point.
-    pub(super) fn farthest_m(&self) -> f32 {
-        self.high_m[RANGE]
-    }
-
-    /// Whether any of its points may have a range between two.
-    #[inline(always)]
-    pub(super) fn is_between(&self, ranges_m: &Range<f32>) -> bool {
-        self.nearest_m() <= ranges_m.end && self.farthest_m() >= ranges_m.start
-    }
-
-    /// The place in its layer where the runs end that follow it and are known to belong to its set.
-    pub(super) fn alike_until(&self) -> usize {
-        usize::from(self.alike_until)
-    }
-
     /// Its columns.
     pub(super) fn columns(&self) -> Range<usize> {
         usize::from(self.columns.start)..usize::from(self.columns.end)
     }
 
-    /// Square of the distance between its box and a point.
-    #[inline(always)]
-    pub(super) fn squared_distance_to(&self, position_m: [f32; 3]) -> f32 {
-        let mut squared = 0.0;
-        for (axis, metres) in position_m.into_iter().enumerate() {
-            let outside = greatest(self.low_m[axis] - metres, metres - self.high_m[axis]);
-            let apart = greatest(outside, 0.0);
-            squared += apart * apart;
-        }
-        squared
+    /// Its layer.
+    pub(super) fn layer(&self) -> usize {
+        usize::from(self.layer)
     }
 
-    /// Square of the distance between its box and that of another run.
-    #[inline(always)]
-    pub(super) fn squared_distance(&self, other: &Run) -> f32 {
-        let [x, y, z, _] = [0, 1, 2, RANGE].map(|axis: usize| {
-            let below = self.low_m[axis] - other.high_m[axis];
-            let above = other.low_m[axis] - self.high_m[axis];
-            let apart = greatest(greatest(below, above), 0.0);
-            apart * apart
-        });
-        x + y + z
+    /// Its point in a column.
+    pub(super) fn point(&self, column: usize) -> usize {
+        column * MAX_LAYERS + self.layer()
+    }
+
+    /// Whether any of its points is a neighbour of any of another run.
+    pub(super) fn touches(&self, other: &Self, core: &Core<'_>) -> bool {
+        // What is short is looked at point by point.
+        let (short, long) = if self.columns().len() < other.columns().len() {
+            (self, other)
+        } else {
+            (other, self)
+        };
+        // Its nearest point reaches farthest.
+        let nearest_m = short.bounds.nearest_m();
+        let cone = Cone::around(nearest_m, core.parameters.eps_m(nearest_m));
+        let (_, reach) = core.windows.extent(short.layer(), cone);
+        for near in core.windows.around(&long.columns(), reach) {
+            for column in overlap(&near, &short.columns()) {
+                let point = short.point(column);
+                let squared = long
+                    .bounds
+                    .squared_distance_to(core.returns.position_m(point));
+                if squared > core.returns.eps_squared[point] {
+                    continue;
+                }
+                for stretch in core.windows.stretches(column, reach, reach) {
+                    let mut both = overlap(&stretch, &long.columns());
+                    if both.any(|column| core.returns.are_neighbours(point, long.point(column))) {
+                        return true;
+                    }
+                }
+            }
+        }
+        false
     }
 }
 
-/// The runs of every layer, in the order of their columns. Its buffers are made once.
+/// All runs, in the order in which the array has their first points. Its buffers are made once.
 #[derive(Debug, Clone)]
 pub(super) struct Runs {
-    layers: [Vec<Run>; MAX_LAYERS],
-    count: u16,
-    /// How many runs of each layer begin before the first of so many columns, and so on.
-    begun: [[u16; MAX_LAYERS]; MAX_COLUMNS.div_ceil(BLOCK)],
+    /// There are no more than points, so that 16 bits hold the number of one.
+    runs: Vec<Run>,
     /// The number of every point's run, or [`Runs::NONE`].
     of: Box<[u16; CAPACITY]>,
     /// Where runs begin, or have just ended.
@@ -112,9 +103,7 @@ impl Runs {
 
     pub(super) fn new() -> Self {
         Self {
-            layers: Default::default(),
-            count: 0,
-            begun: [[0; MAX_LAYERS]; MAX_COLUMNS.div_ceil(BLOCK)],
+            runs: vec![],
             of: Box::new([Self::NONE; CAPACITY]),
             edges: Box::new([false; CAPACITY]),
             open: [Self::NONE; MAX_LAYERS],
@@ -123,46 +112,9 @@ impl Runs {
         }
     }
 
-    /// How many there are.
-    pub(super) fn count(&self) -> usize {
-        usize::from(self.count)
-    }
-
-    /// The runs of a layer.
-    pub(super) fn of_layer(&self, layer: usize) -> &[Run] {
-        &self.layers[layer]
-    }
-
-    /// The place of the first run of a layer that ends behind the beginning of a column.
-    pub(super) fn first_behind(&self, column: usize, layer: usize) -> usize {
-        let runs = &self.layers[layer];
-        let begun = usize::from(self.begun[column / BLOCK][layer]);
-        let mut place = begun.saturating_sub(1);
-        while place < runs.len() && runs[place].columns().end <= column {
-            place += 1;
-        }
-        place
-    }
-
-    /// All of them, with their layers.
-    pub(super) fn iter(&self) -> impl Iterator<Item = (usize, &Run)> {
-        let layers = self.layers.iter().enumerate();
-        layers.flat_map(|(layer, runs)| runs.iter().map(move |run| (layer, run)))
-    }
-
-    /// Takes note of which runs follow others of the same set, given the set of each.
-    pub(super) fn note_alike(&mut self, sets: &[u32]) {
-        for runs in &mut self.layers {
-            let set_of = |run: &Run| sets[usize::from(run.number)];
-            let mut next = (u32::MAX, 0);
-            for (place, run) in runs.iter_mut().enumerate().rev() {
-                let set = set_of(run);
-                if set != next.0 {
-                    next = (set, place as u16 + 1);
-                }
-                run.alike_until = next.1;
-            }
-        }
+    /// All of them, by their numbers.
+    pub(super) fn all(&self) -> &[Run] {
+        &self.runs
     }
 
     /// Gives a point the run of another one.
@@ -178,17 +130,12 @@ impl Runs {
     /// Finds the runs anew.
     pub(super) fn find(&mut self, returns: &Returns<'_>, density: &Density) {
         let len = returns.x_m.len();
-        self.layers.iter_mut().for_each(Vec::clear);
-        self.count = 0;
+        self.runs.clear();
         self.open = [Self::NONE; MAX_LAYERS];
         let is_core = &density.is_core[..len];
         mark_edges(is_core, &density.follows[..len], &mut self.edges[..len]);
         let is_core = is_core.as_chunks::<MAX_LAYERS>().0.iter();
         for (column, is_core) in is_core.enumerate() {
-            if column % BLOCK == 0 {
-                let begun = &mut self.begun[column / BLOCK];
-                *begun = self.layers.each_ref().map(|runs| runs.len() as u16);
-            }
             let edges = &self.edges.as_chunks().0[column];
             // A byte for each layer, the first one lowest; those that were met are taken out.
             let mut edges = u128::from_le_bytes(edges.map(u8::from));
@@ -215,33 +162,35 @@ impl Runs {
 
     /// Begins a run.
     fn begin(&mut self, layer: usize, column: usize) {
-        self.open[layer] = self.count;
+        self.open[layer] = self.runs.len() as u16;
         let column = column as u16;
-        self.layers[layer].push(Run {
-            number: self.count,
+        self.runs.push(Run {
+            layer: layer as u8,
             columns: column..column,
-            alike_until: 0,
-            low_m: Corner::default(),
-            high_m: Corner::default(),
+            bounds: Bounds::NONE,
         });
-        self.count += 1;
         for axis in 0..AXES {
-            self.low_m[axis][layer] = f32::INFINITY;
-            self.high_m[axis][layer] = f32::NEG_INFINITY;
+            self.low_m[axis][layer] = Bounds::NONE.low_m[axis];
+            self.high_m[axis][layer] = Bounds::NONE.high_m[axis];
         }
     }
 
     /// Ends the run that goes on in a layer, if there is one, before a column.
     fn end(&mut self, layer: usize, column: usize) {
-        if self.open[layer] != Self::NONE
-            && let Some(run) = self.layers[layer].last_mut()
-        {
+        let number = std::mem::replace(&mut self.open[layer], Self::NONE);
+        if let Some(run) = self.runs.get_mut(usize::from(number)) {
             run.columns.end = column as u16;
-            run.low_m = [0, 1, 2, 3].map(|axis: usize| self.low_m[axis][layer]);
-            run.high_m = [0, 1, 2, 3].map(|axis: usize| self.high_m[axis][layer]);
-            self.open[layer] = Self::NONE;
+            run.bounds = Bounds {
+                low_m: [0, 1, 2, 3].map(|axis: usize| self.low_m[axis][layer]),
+                high_m: [0, 1, 2, 3].map(|axis: usize| self.high_m[axis][layer]),
+            };
         }
     }
+}
+
+/// The columns of two stretches.
+fn overlap(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+    a.start.max(b.start)..a.end.min(b.end)
 }
 
 /// Marks the columns where a stretch of core points that follow each other begins, and those

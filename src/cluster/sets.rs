@@ -1,0 +1,125 @@
+//! Sets of runs that are known to belong together, and which of them do, too.
+
+use std::ops::Range;
+
+use super::ClusterParameters;
+use super::boxes::{Bounds, Boxes};
+use super::runs::{Core, Run};
+use crate::partition::Partition;
+
+/// The sets of a partition of the runs, in the order in which they begin along x. Its buffers are
+/// made once.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Sets {
+    sets: Vec<Set>,
+    boxes: Boxes,
+    /// The place of each set in the order, by its first run.
+    places: Vec<u32>,
+    members: Members,
+}
+
+/// Runs that are known to belong together.
+#[derive(Debug, Clone)]
+struct Set {
+    /// Number of its first run.
+    first: u32,
+    /// Around its runs.
+    bounds: Bounds,
+    /// Where its runs stand among the members of all sets.
+    members: Range<usize>,
+}
+
+impl Sets {
+    /// Takes over the runs, given the first run of the set of each.
+    pub(super) fn gather(&mut self, runs: &[Run], firsts: &[u32], parameters: &ClusterParameters) {
+        self.sets.clear();
+        self.places.clear();
+        for ((run, first), number) in runs.iter().zip(firsts).zip(0..) {
+            self.places.push(self.sets.len() as u32);
+            if *first == number {
+                self.sets.push(Set {
+                    first: number,
+                    bounds: Bounds::NONE,
+                    members: 0..0,
+                });
+            }
+            let set = &mut self.sets[self.places[*first as usize] as usize];
+            set.bounds.hold(&run.bounds);
+            set.members.end += 1;
+        }
+        self.sets.sort_unstable_by(|a, b| {
+            let by_x = a.bounds.low_m[0].total_cmp(&b.bounds.low_m[0]);
+            by_x.then(a.first.cmp(&b.first))
+        });
+        let mut total = 0;
+        for (set, place) in self.sets.iter_mut().zip(0..) {
+            self.places[set.first as usize] = place;
+            let count = set.members.len();
+            // They are counted once more, one by one, when they are put there.
+            set.members = total..total;
+            total += count;
+        }
+        self.members.runs.resize(total, 0);
+        for (first, number) in firsts.iter().zip(0..) {
+            let set = &mut self.sets[self.places[*first as usize] as usize];
+            self.members.runs[set.members.end] = number;
+            set.members.end += 1;
+        }
+        let members = self.members.runs.iter();
+        self.members
+            .boxes
+            .set(members.map(|run| &runs[*run as usize].bounds), parameters);
+        self.boxes
+            .set(self.sets.iter().map(|set| &set.bounds), parameters);
+    }
+
+    /// Joins the sets of which any runs touch each other.
+    pub(super) fn join(&mut self, runs: &[Run], partition: &mut Partition, core: &Core<'_>) {
+        for (place, set) in self.sets.iter().enumerate() {
+            let end = self.boxes.end_of_near(&set.bounds, core.parameters);
+            let others = self
+                .boxes
+                .near(place + 1..end, &set.bounds, core.parameters);
+            for other in others.map(|other| &self.sets[other]) {
+                if partition.find(set.first) != partition.find(other.first)
+                    && self.members.touch(set, other, runs, core)
+                {
+                    partition.join(set.first, other.first);
+                }
+            }
+        }
+    }
+}
+
+/// The runs of all sets, those of each side by side. Its buffers are made once.
+#[derive(Debug, Clone, Default)]
+struct Members {
+    runs: Vec<u32>,
+    boxes: Boxes,
+    /// Those of one set that are near another one.
+    near: Vec<u32>,
+    near_boxes: Boxes,
+}
+
+impl Members {
+    /// Whether any runs of two sets touch each other.
+    fn touch(&mut self, set: &Set, other: &Set, runs: &[Run], core: &Core<'_>) -> bool {
+        let parameters = core.parameters;
+        let run = |number: u32| &runs[number as usize];
+        let near = self
+            .boxes
+            .near(set.members.clone(), &other.bounds, parameters);
+        self.near.clear();
+        self.near.extend(near.map(|member| self.runs[member]));
+        let bounds = self.near.iter().map(|number| &run(*number).bounds);
+        self.near_boxes.set(bounds, parameters);
+        let others = self
+            .boxes
+            .near(other.members.clone(), &set.bounds, parameters);
+        others.map(|member| run(self.runs[member])).any(|other| {
+            let all = 0..self.near.len();
+            let mut near = self.near_boxes.near(all, &other.bounds, parameters);
+            near.any(|place| run(self.near[place]).touches(other, core))
+        })
+    }
+}
