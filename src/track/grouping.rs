@@ -1,5 +1,7 @@
 //! What may be one object: returns in the place of a known one, and clusters that none explains.
 
+use std::ops::Range;
+
 use nalgebra::Vector2;
 
 use super::claims::Claims;
@@ -8,10 +10,11 @@ use super::look::Look;
 use super::patches::Placer;
 use super::rectangle::Extent;
 use super::road_user::Track;
-use super::spots::Spot;
+use super::spots::{Spot, places_m};
 use super::strays::Strays;
 use super::{Scene, TrackParameters};
 use crate::cluster::Clusters;
+use crate::float::{greatest, least};
 
 /// The groups of a revolution.
 #[derive(Debug, Clone, Default)]
@@ -19,8 +22,9 @@ pub(super) struct Grouping {
     placer: Placer,
     strays: Strays,
     spots: Vec<Spot>,
-    /// Where the spots of each group begin, and the spots, while they are sorted.
-    begins: Vec<usize>,
+    /// Stretches of spots that have one group each, by its number.
+    stretches: Vec<(usize, Range<usize>)>,
+    /// The spots, while they are sorted.
     sorted: Vec<Spot>,
     groups: Vec<Group>,
     /// The groups before some were joined.
@@ -32,6 +36,8 @@ pub(super) struct Grouping {
     /// The bounds of each group, and the one that it joins.
     boxes: Vec<[Vector2<f64>; 2]>,
     target: Vec<usize>,
+    /// That one and its own number, of each group.
+    joins: Vec<(usize, usize)>,
     /// Group numbers of what was cut off structure, ascending.
     suspects: Vec<u32>,
 }
@@ -67,8 +73,6 @@ impl Grouping {
         self.placer.place(clusters, scene, parameters);
         self.divide(tracks, scene, parameters);
         self.strays.add(tracks, clusters, scene, &mut self.spots);
-        // Looks of the last revolution are none of this one.
-        self.groups.clear();
         self.gather(tracks, scene);
         self.join_pieces(tracks, scene);
     }
@@ -111,8 +115,8 @@ impl Grouping {
                 .settle(placed, &self.near, &self.forecasts, is_whole);
             for (placed, track) in placed.iter().zip(self.claims.owners()) {
                 if let Some(group) = track.map(|track| track as u32).or(is_whole.then_some(own)) {
-                    let at_m = origin_m + Vector2::from(placed.at_m).map(f64::from);
-                    self.spots.push(Spot::new(scene, placed.point, at_m, group));
+                    self.spots
+                        .push(Spot::new(scene, placed.point, placed.at_m, group));
                 }
             }
             let spots = &mut self.spots[begin..];
@@ -131,55 +135,68 @@ impl Grouping {
         }
     }
 
-    /// Puts the spots of every group side by side and looks at it, unless it is as it was.
+    /// Puts the spots of every group side by side and looks at it.
     fn gather(&mut self, tracks: &[Track], scene: &Scene<'_>) {
-        let sensor_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
-        self.sort_spots(tracks.len() + self.placer.patches().len());
-        std::mem::swap(&mut self.groups, &mut self.former);
-        self.groups.clear();
-        let mut former = self.former.iter().peekable();
-        let mut begin = 0;
+        self.stretches.clear();
+        let mut end = 0;
         for spots in self.spots.chunk_by(|a, b| a.group == b.group) {
-            let end = begin + spots.len();
-            let number = spots[0].group;
-            let claimed_by = Some(number as usize).filter(|number| *number < tracks.len());
+            let begin = end;
+            end += spots.len();
+            self.stretches.push((spots[0].group as usize, begin..end));
+        }
+        self.groups.clear();
+        self.sorted.clear();
+        let sensor_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
+        self.stretches
+            .sort_unstable_by_key(|(number, spots)| (*number, spots.start));
+        for own in self.stretches.chunk_by(|a, b| a.0 == b.0) {
+            let number = own[0].0;
+            let begin = self.sorted.len();
+            for (_, spots) in own {
+                self.sorted.extend_from_slice(&self.spots[spots.clone()]);
+            }
+            let spots = &self.sorted[begin..];
+            let claimed_by = Some(number).filter(|number| *number < tracks.len());
             if spots.len() >= FEWEST_RETURNS || claimed_by.is_some() {
-                while former.next_if(|group| group.number < number).is_some() {}
-                // Groups lose all of their spots or none.
-                let same = former.next_if(|group| {
-                    group.number == number && group.end - group.begin == spots.len()
-                });
                 self.groups.push(Group {
-                    number,
+                    number: number as u32,
                     begin,
-                    end,
-                    look: same
-                        .map_or_else(|| Look::at(spots, scene.scan, sensor_m), |group| group.look),
+                    end: self.sorted.len(),
+                    look: Look::at(spots, scene.scan, sensor_m),
                     claimed_by,
                 });
             }
-            begin = end;
         }
+        std::mem::swap(&mut self.spots, &mut self.sorted);
     }
 
-    /// Sorts spots by their groups, which are numbered below a bound.
-    fn sort_spots(&mut self, bound: usize) {
-        self.begins.clear();
-        self.begins.resize(bound + 1, 0);
-        for spot in &self.spots {
-            self.begins[spot.group as usize + 1] += 1;
-        }
-        for group in 1..=bound {
-            self.begins[group] += self.begins[group - 1];
-        }
-        // What is in it is overwritten.
-        self.sorted.truncate(self.spots.len());
-        self.sorted
-            .extend_from_slice(&self.spots[self.sorted.len()..]);
-        for spot in &self.spots {
-            let at = &mut self.begins[spot.group as usize];
-            self.sorted[*at] = *spot;
-            *at += 1;
+    /// Makes one of the groups that have the same target, and looks at what has grown.
+    fn gather_joined(&mut self, scene: &Scene<'_>) {
+        std::mem::swap(&mut self.groups, &mut self.former);
+        self.groups.clear();
+        self.sorted.clear();
+        self.joins.clear();
+        self.joins.extend(self.target.iter().copied().zip(0..));
+        self.joins.sort_unstable();
+        let sensor_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
+        for joined in self.joins.chunk_by(|a, b| a.0 == b.0) {
+            let begin = self.sorted.len();
+            for (_, piece) in joined {
+                let piece = &self.former[*piece];
+                self.sorted
+                    .extend_from_slice(&self.spots[piece.begin..piece.end]);
+            }
+            let (target, first) = joined[0];
+            let look = match joined {
+                [_] => self.former[first].look,
+                _ => Look::at(&self.sorted[begin..], scene.scan, sensor_m),
+            };
+            self.groups.push(Group {
+                begin,
+                end: self.sorted.len(),
+                look,
+                ..self.former[target]
+            });
         }
         std::mem::swap(&mut self.spots, &mut self.sorted);
     }
@@ -221,17 +238,9 @@ impl Grouping {
                 (*target, joined) = (owner, true);
             }
         }
-        for (number, group) in self.groups.iter().enumerate() {
-            if target[number] != number {
-                let to = self.groups[target[number]].number;
-                for spot in &mut self.spots[group.begin..group.end] {
-                    spot.group = to;
-                }
-            }
-        }
         (self.boxes, self.target) = (boxes, target);
         if joined {
-            self.gather(tracks, scene);
+            self.gather_joined(scene);
         }
     }
 
@@ -273,29 +282,34 @@ impl Grouping {
     }
 
     fn bounds(&self, group: &Group) -> [Vector2<f64>; 2] {
-        self.spots(group).iter().fold(
-            [Vector2::repeat(f64::MAX), Vector2::repeat(f64::MIN)],
-            |[low, high], spot| [low.inf(&spot.at_m), high.sup(&spot.at_m)],
-        )
+        let (mut low_m, mut high_m) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+        for spot in self.spots(group) {
+            for (axis, metres) in spot.at_m.into_iter().enumerate() {
+                low_m[axis] = least(low_m[axis], metres);
+                high_m[axis] = greatest(high_m[axis], metres);
+            }
+        }
+        [low_m, high_m].map(|corner_m| Vector2::from(corner_m.map(f64::from)))
     }
 }
 
 /// What moves is seen twice at the seam of the sweep, a revolution apart: brings the older part
 /// of a known object, of which spots are in the order of the scan, to the time of the newer.
 fn align_seam(spots: &mut [Spot], tracks: &[Track], duration_s: f64) {
+    let half_s = 0.5 * duration_s as f32;
     let (Some(oldest), Some(newest)) = (spots.first(), spots.last()) else {
         return;
     };
-    if oldest.age_s - newest.age_s <= 0.5 * duration_s {
+    if oldest.age_s - newest.age_s <= half_s {
         return;
     }
-    for spot in spots
-        .iter_mut()
-        .filter(|spot| spot.age_s > 0.5 * duration_s)
-    {
+    for spot in spots.iter_mut().filter(|spot| spot.age_s > half_s) {
         if let Some(track) = tracks.get(spot.group as usize) {
-            spot.at_m += track.velocity_mps() * duration_s;
-            spot.age_s -= duration_s;
+            let moved_m = track.velocity_mps() * duration_s;
+            for axis in 0..2 {
+                spot.at_m[axis] += moved_m[axis] as f32;
+            }
+            spot.age_s -= duration_s as f32;
         }
     }
 }
@@ -309,6 +323,6 @@ fn fits(spots: &[Spot], forecast: &Forecast) -> bool {
 /// Least and greatest coordinates of spots along and across a direction.
 fn extent(spots: &[Spot], yaw_rad: f64) -> [[f64; 2]; 2] {
     let (sine, cosine) = libm::sincos(yaw_rad);
-    let extent = Extent::of(spots.iter().map(|spot| spot.at_m.into()), sine, cosine);
+    let extent = Extent::of(places_m(spots), sine, cosine);
     [extent.low, extent.high]
 }

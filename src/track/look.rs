@@ -6,8 +6,9 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::rectangle::{Extent, turned};
-use super::spots::Spot;
+use super::spots::{Spot, places_m};
 use crate::cloud::{MAX_LAYERS, Scan};
+use crate::float::{greatest, least};
 
 /// A group of returns in the axes of a box.
 #[derive(Debug, Clone, Copy)]
@@ -57,7 +58,7 @@ pub(super) struct Look {
 }
 
 /// What begins higher has lost its wheels and bumpers to the ground, or between two layers.
-const BELT_M: f64 = 0.55;
+const BELT_M: f32 = 0.55;
 /// Share of returns below it that shows a body.
 const LOW_SHARE: f64 = 0.15;
 /// A nearer return by this much beside an object hides a part of it.
@@ -69,41 +70,44 @@ impl Look {
     /// `spots` must not be empty.
     pub(super) fn at(spots: &[Spot], scan: &Scan, sensor_m: Vector2<f64>) -> Self {
         let count = spots.len() as f64;
-        let mut middle_m = Vector2::zeros();
-        let (mut age_s, mut floor_m, mut top_m) = (0.0, f64::MAX, f64::MIN);
-        let mut top_point = 0;
+        let (mut sum_m, mut age_s, mut low) = ([0.0; 2], 0.0, 0u32);
+        let (mut floor_m, mut top_m, mut top_point) = (f32::INFINITY, f32::NEG_INFINITY, 0);
         for spot in spots {
-            middle_m += spot.at_m;
-            age_s += spot.age_s;
-            floor_m = floor_m.min(spot.above_m);
+            for (sum_m, metres) in sum_m.iter_mut().zip(spot.at_m) {
+                *sum_m += f64::from(metres);
+            }
+            age_s += f64::from(spot.age_s);
+            low += u32::from(spot.above_m <= BELT_M);
+            floor_m = least(floor_m, spot.above_m);
             if spot.above_m > top_m {
                 (top_m, top_point) = (spot.above_m, spot.point as usize);
             }
         }
-        middle_m /= count;
-        age_s /= count;
-        let range_m = (middle_m - sensor_m).norm();
+        let sight_m = Vector2::from(sum_m) / count;
+        let middle_m = sensor_m + sight_m;
+        let range_m = sight_m.norm();
+        let top_m = f64::from(top_m);
         let layer = scan.layer(top_point);
         let top_below_m = if layer + 1 < MAX_LAYERS && !is_covered(scan, top_point) {
             top_m + range_m * (scan.slope(layer + 1).0 - scan.slope(layer).0)
         } else {
             f64::MAX
         };
-        let low = spots.iter().filter(|spot| spot.above_m <= BELT_M).count();
-        let ends = ends(spots, sensor_m);
+        let ends = ends(spots);
+        let ends_m = ends.map(|end| sensor_m + Vector2::from(end.at_m).map(f64::from));
         Self {
             middle_m,
-            age_s,
+            age_s: age_s / count,
             points: spots.len(),
-            floor_m,
+            floor_m: f64::from(floor_m),
             top_m,
             top_below_m,
             upper_m: upper_m(spots),
             roughness_m: roughness_m(spots, scan),
             goes_on: goes_on(spots, scan),
             range_m,
-            is_upper: (low as f64) < (LOW_SHARE * count).max(2.0),
-            ends_m: ends.map(|end| end.map_or(middle_m, |end| end.at_m)),
+            is_upper: f64::from(low) < (LOW_SHARE * count).max(2.0),
+            ends_m,
             is_cut: cuts(spots, ends, scan),
             sensor_m,
         }
@@ -117,12 +121,10 @@ impl Look {
     /// The same group in the axes of a yaw.
     pub(super) fn view(&self, spots: &[Spot], yaw_rad: f64) -> View {
         let (sine, cosine) = libm::sincos(yaw_rad);
-        let places_m = spots.iter().map(|spot| spot.at_m.into());
-        let Extent {
-            low: low_m,
-            high: high_m,
-        } = Extent::of(places_m, sine, cosine);
+        let extent = Extent::of(places_m(spots), sine, cosine);
         let sensor = turned(&self.sensor_m.into(), sine, cosine);
+        let [low_m, high_m] =
+            [extent.low, extent.high].map(|end| [0, 1].map(|axis| sensor[axis] + end[axis]));
         let sight = self.middle_m - self.sensor_m;
         let left = Vector2::new(-sight.y, sight.x).normalize();
         let left = turned(&left.into(), sine, cosine);
@@ -298,24 +300,25 @@ fn goes_on(spots: &[Spot], scan: &Scan) -> f64 {
     f64::from(on) / f64::from(columns.max(1))
 }
 
-/// The leftmost and the rightmost of a group, seen from the sensor, which it does not surround.
-fn ends(spots: &[Spot], sensor_m: Vector2<f64>) -> [Option<&Spot>; 2] {
-    let mut ends = [spots.first(); 2];
-    let mut rays_m = ends.map(|end| end.map_or(sensor_m, |end| end.at_m) - sensor_m);
-    for spot in spots {
-        let ray_m = spot.at_m - sensor_m;
-        if rays_m[0].perp(&ray_m) >= 0.0 {
-            (rays_m[0], ends[0]) = (ray_m, Some(spot));
-        }
-        if rays_m[1].perp(&ray_m) < 0.0 {
-            (rays_m[1], ends[1]) = (ray_m, Some(spot));
-        }
-    }
-    ends
+/// The leftmost and the rightmost of a group, seen from the sensor, which it does not surround; of
+/// a column, the lowest.
+fn ends(spots: &[Spot]) -> [&Spot; 2] {
+    let column_of = |spot: &Spot| spot.point as usize / MAX_LAYERS;
+    let is_to_left =
+        |of: &Spot, spot: &Spot| of.at_m[0] * spot.at_m[1] - of.at_m[1] * spot.at_m[0] > 0.0;
+    spots
+        .chunk_by(|a, b| column_of(a) == column_of(b))
+        .map(|column| &column[0])
+        .fold([&spots[0]; 2], |[left, right], spot| {
+            [
+                if is_to_left(left, spot) { spot } else { left },
+                if is_to_left(spot, right) { spot } else { right },
+            ]
+        })
 }
 
 /// Whether something nearer stands directly to the left and to the right of a group.
-fn cuts(spots: &[Spot], ends: [Option<&Spot>; 2], scan: &Scan) -> [bool; 2] {
+fn cuts(spots: &[Spot], ends: [&Spot; 2], scan: &Scan) -> [bool; 2] {
     let layers = spots.iter().map(|spot| scan.layer(spot.point as usize));
     let (low, high) = layers.fold((MAX_LAYERS, 0), |(low, high), layer| {
         (low.min(layer), high.max(layer))
@@ -325,8 +328,7 @@ fn cuts(spots: &[Spot], ends: [Option<&Spot>; 2], scan: &Scan) -> [bool; 2] {
     let directions = [!forward, forward];
     let columns = scan.columns();
     std::array::from_fn(|side| {
-        let Some(end) = ends[side] else { return false };
-        let point = end.point as usize;
+        let point = ends[side].point as usize;
         let range_m = f64::from(scan.range_m()[point]);
         (1..=BESIDE).any(|step| {
             let step = if directions[side] {
@@ -345,14 +347,21 @@ fn cuts(spots: &[Spot], ends: [Option<&Spot>; 2], scan: &Scan) -> [bool; 2] {
 
 /// Diagonal of the returns above the height of bonnets and handlebars.
 fn upper_m(spots: &[Spot]) -> Option<f64> {
-    const UPPER_M: f64 = 1.1;
-    let upper = spots.iter().filter(|spot| spot.above_m > UPPER_M);
-    let bounds = upper.fold(None, |bounds, spot| {
-        let (low, high, count) = bounds.unwrap_or((spot.at_m, spot.at_m, 0));
-        Some((low.inf(&spot.at_m), high.sup(&spot.at_m), count + 1))
-    });
-    let (low, high, count): (Vector2<f64>, Vector2<f64>, usize) = bounds?;
-    (count >= 2).then(|| (high - low).norm())
+    const UPPER_M: f32 = 1.1;
+    let (mut low_m, mut high_m, mut count) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2], 0u32);
+    for spot in spots {
+        let is_upper = spot.above_m > UPPER_M;
+        for (axis, metres) in spot.at_m.into_iter().enumerate() {
+            low_m[axis] = least(low_m[axis], if is_upper { metres } else { f32::INFINITY });
+            high_m[axis] = greatest(
+                high_m[axis],
+                if is_upper { metres } else { f32::NEG_INFINITY },
+            );
+        }
+        count += u32::from(is_upper);
+    }
+    let side_m = |axis: usize| f64::from(high_m[axis] - low_m[axis]);
+    (count >= 2).then(|| libm::hypot(side_m(0), side_m(1)))
 }
 
 /// Median of the second difference of ranges along the layers: surfaces are smooth, leaves and

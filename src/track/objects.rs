@@ -303,7 +303,7 @@ impl ObjectTracker {
 fn floor_z_m(spots: &[Spot], scene: &Scene<'_>) -> f64 {
     let lowest = spots.iter().min_by(|a, b| a.above_m.total_cmp(&b.above_m));
     let z_m = lowest.map_or(0.0, |spot| {
-        f64::from(scene.scan.z_m()[spot.point as usize]) - spot.above_m
+        f64::from(scene.scan.z_m()[spot.point as usize] - spot.above_m)
     });
     scene.sweep.sensor.position_m[2] + z_m
 }

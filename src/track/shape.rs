@@ -3,7 +3,7 @@
 
 use super::Rectangle;
 use super::look::{Look, View};
-use super::spots::Spot;
+use super::spots::{Spot, places_m};
 use crate::ego::wrapped_rad;
 
 /// What is known of an object's direction and size.
@@ -248,7 +248,7 @@ pub(super) fn fitted_yaw(spots: &[Spot], outline: &mut Vec<[f64; 2]>) -> Option<
         return None;
     }
     outline.clear();
-    outline.extend(spots.iter().map(|spot| <[f64; 2]>::from(spot.at_m)));
+    outline.extend(places_m(spots));
     let rectangle = Rectangle::fit(outline, None);
     if rectangle.length_m < SHORTEST_M {
         return None;

@@ -1,18 +1,16 @@
-//! Returns of one revolution that may be road users, in the local frame.
-
-use nalgebra::Vector2;
+//! Returns of one revolution that may be road users.
 
 use super::Scene;
 
 /// One return.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Spot {
-    /// In the local frame, where the sensor was when it saw it.
-    pub(super) at_m: Vector2<f64>,
+    /// Along the axes of the local frame, and relative to where the sensor is at the end.
+    pub(super) at_m: [f32; 2],
     /// Above the ground.
-    pub(super) above_m: f64,
+    pub(super) above_m: f32,
     /// Before the end of the sweep.
-    pub(super) age_s: f64,
+    pub(super) age_s: f32,
     /// Its place in the scan.
     pub(super) point: u32,
     /// The group that it belongs to.
@@ -21,14 +19,19 @@ pub(super) struct Spot {
 
 impl Spot {
     /// A point of the scan that belongs to a group, where it was placed.
-    pub(super) fn new(scene: &Scene<'_>, point: u32, at_m: Vector2<f64>, group: u32) -> Self {
+    pub(super) fn new(scene: &Scene<'_>, point: u32, at_m: [f32; 2], group: u32) -> Self {
         let column = scene.scan.column(point as usize);
         Self {
             at_m,
-            above_m: f64::from(scene.heights_m[point as usize]),
-            age_s: scene.scan.age_s(column),
+            above_m: scene.heights_m[point as usize],
+            age_s: scene.scan.age_s(column) as f32,
             point,
             group,
         }
     }
+}
+
+/// Where spots are, relative to where the sensor is at the end of the sweep.
+pub(super) fn places_m(spots: &[Spot]) -> impl Iterator<Item = [f64; 2]> {
+    spots.iter().map(|spot| spot.at_m.map(f64::from))
 }

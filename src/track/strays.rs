@@ -35,6 +35,7 @@ impl Strays {
     ) {
         let Scene { scan, sweep, .. } = *scene;
         let placement = sweep.sensor.placement();
+        let origin_m = placement.origin_m();
         for (number, track) in tracks.iter().enumerate() {
             if !track.is_confirmed() || !track.is_sparse() {
                 continue;
@@ -56,7 +57,8 @@ impl Strays {
                     let at_m = scene.placements[scan.column(point)].local_m([x, y]);
                     if outline.distance_m(at_m) < NEAR_M {
                         let (point, group) = (point as u32, number as u32);
-                        spots.push(Spot::new(scene, point, at_m.into(), group));
+                        let offset_m = [0, 1].map(|axis| (at_m[axis] - origin_m[axis]) as f32);
+                        spots.push(Spot::new(scene, point, offset_m, group));
                     }
                 }
             }
