@@ -326,3 +326,79 @@ fn extent(spots: &[Spot], yaw_rad: f64) -> [[f64; 2]; 2] {
     let extent = Extent::of(places_m(spots), sine, cosine);
     [extent.low, extent.high]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::Scan;
+    use crate::cloud::tests::scan_of;
+    use crate::track::tests::with_scene;
+
+    /// Spots in columns of one layer, 10 m away, each of a group.
+    fn grouping(scan: &Scan, groups: &[(Range<usize>, u32)]) -> Grouping {
+        let mut grouping = Grouping::default();
+        with_scene(scan, |scene| {
+            for (columns, group) in groups {
+                for column in columns.clone() {
+                    let point = scan.index(column, 7);
+                    let [x, y, _] = scan.point_m(point);
+                    let spot = Spot::new(scene, point as u32, [x, y], *group);
+                    grouping.spots.push(spot);
+                }
+            }
+            grouping.gather(&[], scene);
+        });
+        grouping
+    }
+
+    fn columns(grouping: &Grouping, group: &Group, scan: &Scan) -> Vec<usize> {
+        let spots = grouping.spots(group).iter();
+        spots.map(|spot| scan.column(spot.point as usize)).collect()
+    }
+
+    #[test]
+    fn the_spots_of_a_group_are_put_side_by_side_and_too_few_are_none() {
+        let scan = scan_of(1800, |_, layer| if layer == 7 { 1000 } else { 0 });
+        let groups = [
+            (100..102, 5),
+            (102..106, 2),
+            (106..108, 9),
+            (108..112, 5),
+            (112..113, 2),
+        ];
+        let grouping = grouping(&scan, &groups);
+        let found: Vec<_> = grouping
+            .groups()
+            .iter()
+            .map(|group| (group.number, columns(&grouping, group, &scan)))
+            .collect();
+        assert_eq!(
+            found,
+            [
+                (2, vec![102, 103, 104, 105, 112]),
+                (5, vec![100, 101, 108, 109, 110, 111])
+            ]
+        );
+    }
+
+    #[test]
+    fn pieces_of_a_vehicle_become_one_group_that_is_looked_at_anew() {
+        let scan = scan_of(1800, |_, layer| if layer == 7 { 1000 } else { 0 });
+        // 10 m away a column is 0.035 m wide: pieces of 1.4 m and 0.7 m, 0.35 m apart.
+        let groups = [(100..140, 3), (150..170, 4), (300..340, 8)];
+        let mut grouping = grouping(&scan, &groups);
+        let far = grouping.groups()[2].look.middle_m;
+        with_scene(&scan, |scene| grouping.join_pieces(&[], scene));
+        let [vehicle, other] = grouping.groups() else {
+            panic!("{:?}", grouping.groups());
+        };
+        let expected: Vec<usize> = (100..140).chain(150..170).collect();
+        assert_eq!(columns(&grouping, vehicle, &scan), expected);
+        assert_eq!((vehicle.number, vehicle.look.points), (3, 60));
+        let sum_m = grouping.spots(vehicle).iter().fold([0.0; 2], |sum, spot| {
+            [0, 1].map(|axis| sum[axis] + f64::from(spot.at_m[axis]))
+        });
+        assert!((vehicle.look.middle_m - Vector2::from(sum_m) / 60.0).norm() < 1e-6);
+        assert_eq!((other.number, other.look.middle_m), (8, far));
+    }
+}

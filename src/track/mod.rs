@@ -253,3 +253,31 @@ impl Tracker {
         (last.epoch != sweep.epoch).then(|| (last.carried_on(), sweep.sensor))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::{Origin, Plane};
+
+    /// What is seen by a sensor that stands still, 1.9 m above level ground.
+    pub(super) fn with_scene<T>(scan: &Scan, look: impl FnOnce(&Scene<'_>) -> T) -> T {
+        let heights_m: Vec<f32> = scan.z_m().iter().map(|z| z + 1.9).collect();
+        let ground = GroundReport {
+            plane: Plane::level(1.9),
+            origin: Origin::Found,
+            candidates: 0,
+            support: 0,
+            points: 0,
+        };
+        let sweep = Sweep::still(0);
+        let mut placements = vec![];
+        sweep.placements(scan.columns(), &mut placements);
+        look(&Scene {
+            scan,
+            heights_m: &heights_m,
+            ground: &ground,
+            sweep: &sweep,
+            placements: &placements,
+        })
+    }
+}

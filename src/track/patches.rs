@@ -266,36 +266,18 @@ mod tests {
     use crate::cloud::Scan;
     use crate::cloud::tests::scan_of;
     use crate::cluster::{ClusterParameters, Dbscan};
-    use crate::ego::Sweep;
-    use crate::ground::{GroundReport, Origin, Plane};
     use crate::parameter::Profile;
+    use crate::track::tests::with_scene;
 
     /// The patches of what is seen from 1.9 m above the ground.
     fn patches(distance_cm: impl Fn(usize, usize) -> u16) -> (Placer, Scan) {
         let scan = scan_of(1800, distance_cm);
-        let heights_m: Vec<f32> = scan.z_m().iter().map(|z| z + 1.9).collect();
-        let mut dbscan = Dbscan::new(&ClusterParameters::profile(Profile::Default));
-        let clusters = dbscan.process(&scan, &vec![false; scan.len()], &heights_m);
-        let ground = GroundReport {
-            plane: Plane::level(1.9),
-            origin: Origin::Found,
-            candidates: 0,
-            support: 0,
-            points: 0,
-        };
-        let sweep = Sweep::still(0);
-        let mut placements = vec![];
-        sweep.placements(scan.columns(), &mut placements);
-        let scene = Scene {
-            scan: &scan,
-            heights_m: &heights_m,
-            ground: &ground,
-            sweep: &sweep,
-            placements: &placements,
-        };
-        let parameters = TrackParameters::profile(Profile::Default);
         let mut placer = Placer::default();
-        placer.place(clusters, &scene, &parameters);
+        with_scene(&scan, |scene| {
+            let mut dbscan = Dbscan::new(&ClusterParameters::profile(Profile::Default));
+            let clusters = dbscan.process(&scan, &vec![false; scan.len()], scene.heights_m);
+            placer.place(clusters, scene, &TrackParameters::profile(Profile::Default));
+        });
         (placer, scan)
     }
 
