@@ -18,9 +18,11 @@ pub(super) struct Bounds {
 }
 
 /// A corner of a box: x, y, z, and range.
-pub(super) type Corner = [f32; AXES];
+type Corner = [f32; AXES];
 
 pub(super) const AXES: usize = 4;
+/// Of which so many are in space.
+const SPACE: usize = 3;
 /// The place of the range in a corner.
 const RANGE: usize = 3;
 
@@ -51,7 +53,7 @@ impl Bounds {
 
     /// Square of the distance to a point.
     #[inline(always)]
-    pub(super) fn squared_distance_to(&self, position_m: [f32; 3]) -> f32 {
+    pub(super) fn squared_distance_to(&self, position_m: [f32; SPACE]) -> f32 {
         let mut squared = 0.0;
         for (axis, metres) in position_m.into_iter().enumerate() {
             let outside = greatest(self.low_m[axis] - metres, metres - self.high_m[axis]);
@@ -65,8 +67,8 @@ impl Bounds {
 /// Many boxes, by their numbers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Boxes {
-    low_m: [Vec<f32>; 3],
-    high_m: [Vec<f32>; 3],
+    low_m: [Vec<f32>; SPACE],
+    high_m: [Vec<f32>; SPACE],
     eps_squared: Vec<f32>,
     marks: Vec<bool>,
 }
@@ -78,7 +80,7 @@ impl Boxes {
         boxes: impl Iterator<Item = &'a Bounds> + Clone,
         parameters: &ClusterParameters,
     ) {
-        for axis in 0..3 {
+        for axis in 0..SPACE {
             self.low_m[axis].clear();
             self.low_m[axis].extend(boxes.clone().map(|bounds| bounds.low_m[axis]));
             self.high_m[axis].clear();
@@ -120,8 +122,8 @@ impl Boxes {
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn mark_near(
     (bounds, eps_m): (&Bounds, f32),
-    low_m: [&[f32]; 3],
-    high_m: [&[f32]; 3],
+    low_m: [&[f32]; SPACE],
+    high_m: [&[f32]; SPACE],
     eps_squared: &[f32],
     marks: &mut [bool],
 ) {
@@ -130,7 +132,7 @@ fn mark_near(
     let eps_squared = &eps_squared[..count];
     for place in 0..count {
         let mut squared = 0.0;
-        for axis in 0..3 {
+        for axis in 0..SPACE {
             let below = bounds.low_m[axis] - high_m[axis][place];
             let above = low_m[axis][place] - bounds.high_m[axis];
             let apart = greatest(greatest(below, above), 0.0);

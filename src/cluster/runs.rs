@@ -40,7 +40,7 @@ impl Run {
     }
 
     /// Its layer.
-    pub(super) fn layer(&self) -> usize {
+    fn layer(&self) -> usize {
         usize::from(self.layer)
     }
 

@@ -13,7 +13,7 @@ use crate::partition::Partition;
 pub(super) struct Sets {
     sets: Vec<Set>,
     boxes: Boxes,
-    /// The place of each set in the order, by its first run.
+    /// The place of each set in the order, by its first run; of other runs it says nothing.
     places: Vec<u32>,
     members: Members,
 }
@@ -32,6 +32,24 @@ struct Set {
 impl Sets {
     /// Takes over the runs, given the first run of the set of each.
     pub(super) fn gather(&mut self, runs: &[Run], firsts: &[u32], parameters: &ClusterParameters) {
+        self.find(runs, firsts);
+        self.sort();
+        self.members.runs.resize(runs.len(), 0);
+        for (first, number) in firsts.iter().zip(0..) {
+            let set = &mut self.sets[self.places[*first as usize] as usize];
+            self.members.runs[set.members.end] = number;
+            set.members.end += 1;
+        }
+        let members = self.members.runs.iter();
+        self.members
+            .boxes
+            .set(members.map(|run| &runs[*run as usize].bounds), parameters);
+        self.boxes
+            .set(self.sets.iter().map(|set| &set.bounds), parameters);
+    }
+
+    /// Finds the sets, and how many members each has.
+    fn find(&mut self, runs: &[Run], firsts: &[u32]) {
         self.sets.clear();
         self.places.clear();
         for ((run, first), number) in runs.iter().zip(firsts).zip(0..) {
@@ -47,30 +65,22 @@ impl Sets {
             set.bounds.hold(&run.bounds);
             set.members.end += 1;
         }
+    }
+
+    /// Puts the sets in their order, and says where the members of each begin; there they end, too,
+    /// as long as none was put there.
+    fn sort(&mut self) {
         self.sets.sort_unstable_by(|a, b| {
             let by_x = a.bounds.low_m[0].total_cmp(&b.bounds.low_m[0]);
             by_x.then(a.first.cmp(&b.first))
         });
-        let mut total = 0;
+        let mut next = 0;
         for (set, place) in self.sets.iter_mut().zip(0..) {
             self.places[set.first as usize] = place;
             let count = set.members.len();
-            // They are counted once more, one by one, when they are put there.
-            set.members = total..total;
-            total += count;
+            set.members = next..next;
+            next += count;
         }
-        self.members.runs.resize(total, 0);
-        for (first, number) in firsts.iter().zip(0..) {
-            let set = &mut self.sets[self.places[*first as usize] as usize];
-            self.members.runs[set.members.end] = number;
-            set.members.end += 1;
-        }
-        let members = self.members.runs.iter();
-        self.members
-            .boxes
-            .set(members.map(|run| &runs[*run as usize].bounds), parameters);
-        self.boxes
-            .set(self.sets.iter().map(|set| &set.bounds), parameters);
     }
 
     /// Joins the sets of which any runs touch each other.

@@ -10,11 +10,10 @@ use super::look::Look;
 use super::patches::Placer;
 use super::rectangle::Extent;
 use super::road_user::Track;
-use super::spots::{Spot, places_m};
+use super::spots::{Spot, bounds_m, places_m};
 use super::strays::Strays;
 use super::{Scene, TrackParameters};
 use crate::cluster::Clusters;
-use crate::float::{greatest, least};
 
 /// The groups of a revolution.
 #[derive(Debug, Clone, Default)]
@@ -22,9 +21,8 @@ pub(super) struct Grouping {
     placer: Placer,
     strays: Strays,
     spots: Vec<Spot>,
-    /// Stretches of spots that have one group each, by its number.
-    stretches: Vec<(usize, Range<usize>)>,
-    /// The spots, while they are sorted.
+    /// The stretches of which groups are made, and the spots, while they are sorted.
+    stretches: Vec<Stretch>,
     sorted: Vec<Spot>,
     groups: Vec<Group>,
     /// The groups before some were joined.
@@ -36,10 +34,18 @@ pub(super) struct Grouping {
     /// The bounds of each group, and the one that it joins.
     boxes: Vec<[Vector2<f64>; 2]>,
     target: Vec<usize>,
-    /// That one and its own number, of each group.
-    joins: Vec<(usize, usize)>,
     /// Group numbers of what was cut off structure, ascending.
     suspects: Vec<u32>,
+}
+
+/// Spots side by side that belong to one group.
+#[derive(Debug, Clone)]
+struct Stretch {
+    /// Of the group.
+    number: u32,
+    spots: Range<usize>,
+    /// The group that they were before, if they are all of it.
+    former: Option<usize>,
 }
 
 /// Returns that may be one object: a stretch of the spots.
@@ -142,60 +148,64 @@ impl Grouping {
         for spots in self.spots.chunk_by(|a, b| a.group == b.group) {
             let begin = end;
             end += spots.len();
-            self.stretches.push((spots[0].group as usize, begin..end));
+            self.stretches.push(Stretch {
+                number: spots[0].group,
+                spots: begin..end,
+                former: None,
+            });
         }
-        self.groups.clear();
-        self.sorted.clear();
-        let sensor_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
-        self.stretches
-            .sort_unstable_by_key(|(number, spots)| (*number, spots.start));
-        for own in self.stretches.chunk_by(|a, b| a.0 == b.0) {
-            let number = own[0].0;
-            let begin = self.sorted.len();
-            for (_, spots) in own {
-                self.sorted.extend_from_slice(&self.spots[spots.clone()]);
-            }
-            let spots = &self.sorted[begin..];
-            let claimed_by = Some(number).filter(|number| *number < tracks.len());
-            if spots.len() >= FEWEST_RETURNS || claimed_by.is_some() {
-                self.groups.push(Group {
-                    number: number as u32,
-                    begin,
-                    end: self.sorted.len(),
-                    look: Look::at(spots, scene.scan, sensor_m),
-                    claimed_by,
-                });
-            }
-        }
-        std::mem::swap(&mut self.spots, &mut self.sorted);
+        self.put_together(tracks, scene);
     }
 
-    /// Makes one of the groups that have the same target, and looks at what has grown.
-    fn gather_joined(&mut self, scene: &Scene<'_>) {
+    /// Makes one of the groups that have the same target.
+    fn gather_joined(&mut self, tracks: &[Track], scene: &Scene<'_>) {
         std::mem::swap(&mut self.groups, &mut self.former);
+        self.stretches.clear();
+        for (place, target) in self.target.iter().enumerate() {
+            let group = &self.former[place];
+            self.stretches.push(Stretch {
+                number: self.former[*target].number,
+                spots: group.begin..group.end,
+                former: Some(place),
+            });
+        }
+        self.put_together(tracks, scene);
+    }
+
+    /// Forms groups of stretches that have the same number, and looks at those that are new.
+    fn put_together(&mut self, tracks: &[Track], scene: &Scene<'_>) {
+        let sensor_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
         self.groups.clear();
         self.sorted.clear();
-        self.joins.clear();
-        self.joins.extend(self.target.iter().copied().zip(0..));
-        self.joins.sort_unstable();
-        let sensor_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
-        for joined in self.joins.chunk_by(|a, b| a.0 == b.0) {
+        self.stretches
+            .sort_unstable_by_key(|stretch| (stretch.number, stretch.spots.start));
+        for own in self.stretches.chunk_by(|a, b| a.number == b.number) {
+            let number = own[0].number;
             let begin = self.sorted.len();
-            for (_, piece) in joined {
-                let piece = &self.former[*piece];
-                self.sorted
-                    .extend_from_slice(&self.spots[piece.begin..piece.end]);
+            for stretch in own {
+                let spots = &self.spots[stretch.spots.clone()];
+                self.sorted.extend_from_slice(spots);
             }
-            let (target, first) = joined[0];
-            let look = match joined {
-                [_] => self.former[first].look,
-                _ => Look::at(&self.sorted[begin..], scene.scan, sensor_m),
+            let spots = &self.sorted[begin..];
+            let claimed_by = Some(number as usize).filter(|number| *number < tracks.len());
+            if spots.len() < FEWEST_RETURNS && claimed_by.is_none() {
+                continue;
+            }
+            let look = match own {
+                [
+                    Stretch {
+                        former: Some(place),
+                        ..
+                    },
+                ] => self.former[*place].look,
+                _ => Look::at(spots, scene.scan, sensor_m),
             };
             self.groups.push(Group {
+                number,
                 begin,
                 end: self.sorted.len(),
                 look,
-                ..self.former[target]
+                claimed_by,
             });
         }
         std::mem::swap(&mut self.spots, &mut self.sorted);
@@ -240,7 +250,7 @@ impl Grouping {
         }
         (self.boxes, self.target) = (boxes, target);
         if joined {
-            self.gather_joined(scene);
+            self.gather_joined(tracks, scene);
         }
     }
 
@@ -282,14 +292,8 @@ impl Grouping {
     }
 
     fn bounds(&self, group: &Group) -> [Vector2<f64>; 2] {
-        let (mut low_m, mut high_m) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-        for spot in self.spots(group) {
-            for (axis, metres) in spot.at_m.into_iter().enumerate() {
-                low_m[axis] = least(low_m[axis], metres);
-                high_m[axis] = greatest(high_m[axis], metres);
-            }
-        }
-        [low_m, high_m].map(|corner_m| Vector2::from(corner_m.map(f64::from)))
+        let corners_m = bounds_m(self.spots(group).iter());
+        corners_m.map(|corner_m| Vector2::from(corner_m.map(f64::from)))
     }
 }
 

@@ -4,9 +4,10 @@
 //! does not touch on the `floor`, `grouping` says which `spots` belong together, given what each
 //! track `claims` by its `forecast` and the `strays` near it, `assignment` what is whose, `sight`
 //! what is hidden and what is gone; `nearby` spares all of them what is far away. A
-//! `road_user` learns from each `look` its `motion`, its `shape`, its `class`, and by its `trail`
-//! whether it moves; `existence` says whether it is there at all; and one that was lost gets its id
-//! back (`road_user`). `nearest` is the tracking of the thesis.
+//! `road_user` learns from each `look`, and the `view` of it in the road user's own axes, its
+//! `motion`, its `shape`, its `class`, and by its `trail` whether it moves; `existence` says whether
+//! it is there at all; and one that was lost gets its id back (`road_user`). `nearest` is the
+//! tracking of the thesis.
 
 mod assignment;
 
@@ -51,6 +52,8 @@ mod spots;
 mod strays;
 
 mod trail;
+
+mod view;
 
 pub use class::Class;
 pub use rectangle::{Outline, Rectangle};

@@ -2,8 +2,9 @@
 //! evidence.
 
 use super::Rectangle;
-use super::look::{Look, View};
+use super::look::Look;
 use super::spots::{Spot, places_m};
+use super::view::View;
 use crate::ego::wrapped_rad;
 
 /// What is known of an object's direction and size.
@@ -41,7 +42,7 @@ impl Shape {
     pub(super) fn first(spots: &[Spot], look: &Look, outline: &mut Vec<[f64; 2]>) -> Self {
         let (mut yaw_rad, deviation_rad) =
             fitted_yaw(spots, outline).unwrap_or((0.0, UNKNOWN_YAW_RAD));
-        let mut extent = look.view(spots, yaw_rad).extent_m();
+        let mut extent = View::of(look, spots, yaw_rad).extent_m();
         if extent[0] < extent[1] {
             yaw_rad = wrapped_rad(yaw_rad + std::f64::consts::FRAC_PI_2);
             extent.swap(0, 1);

@@ -1,6 +1,7 @@
 //! Returns of one revolution that may be road users.
 
 use super::Scene;
+use crate::float::{greatest, least};
 
 /// One return.
 #[derive(Debug, Clone, Copy)]
@@ -34,4 +35,15 @@ impl Spot {
 /// Where spots are, relative to where the sensor is at the end of the sweep.
 pub(super) fn places_m(spots: &[Spot]) -> impl Iterator<Item = [f64; 2]> {
     spots.iter().map(|spot| spot.at_m.map(f64::from))
+}
+
+/// The corners of the box that holds spots, in the frame of [`Spot::at_m`]; infinite around none.
+pub(super) fn bounds_m<'a>(spots: impl Iterator<Item = &'a Spot>) -> [[f32; 2]; 2] {
+    let nothing = [[f32::INFINITY; 2], [f32::NEG_INFINITY; 2]];
+    spots.fold(nothing, |[low_m, high_m], spot| {
+        [
+            [0, 1].map(|axis: usize| least(low_m[axis], spot.at_m[axis])),
+            [0, 1].map(|axis: usize| greatest(high_m[axis], spot.at_m[axis])),
+        ]
+    })
 }

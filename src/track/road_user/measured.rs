@@ -9,6 +9,7 @@ use crate::track::class::{Belief, Qualities};
 use crate::track::look::Look;
 use crate::track::shape::fitted_yaw;
 use crate::track::spots::Spot;
+use crate::track::view::View;
 
 /// Speed from which a vehicle shows clearly where it goes.
 const FAST_MPS: f64 = 1.5;
@@ -28,7 +29,7 @@ impl Track {
         if let Some((yaw_rad, deviation_rad)) = fitted_yaw(spots, outline) {
             self.shape.measure_yaw(yaw_rad, deviation_rad);
         }
-        let view = look.view(spots, self.shape.yaw_rad);
+        let view = View::of(look, spots, self.shape.yaw_rad);
         let before = self.shape.size_m(self.belief.vehicle());
         self.shape.learn(&view, look);
         let after = self.shape.size_m(self.belief.vehicle());

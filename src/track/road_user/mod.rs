@@ -10,12 +10,13 @@ mod reunion;
 
 use super::class::Belief;
 use super::existence::Existence;
-use super::look::{Look, View};
+use super::look::Look;
 use super::motion::Motion;
 use super::shape::Shape;
 use super::sight::Sight;
 use super::spots::Spot;
 use super::trail::Trails;
+use super::view::View;
 use super::{Rectangle, TrackParameters};
 use crate::time::{Span, Time};
 use reunion::Parting;
@@ -104,7 +105,7 @@ impl Track {
             is_published: false,
         };
         track.belief = Belief::of(&track.qualities());
-        let view = look.view(spots, track.shape.yaw_rad);
+        let view = View::of(look, spots, track.shape.yaw_rad);
         let (centre_m, noise) = track.centre(&view, look.middle_m);
         track.trails.begin(centre_m);
         track.born_m = centre_m;
@@ -212,7 +213,7 @@ impl Track {
     /// How unlikely it is that a group is this object: the squared Mahalanobis distance of its
     /// place, with a price for a spread that would take anything and for a size that does not fit.
     pub(super) fn cost(&self, spots: &[Spot], look: &Look) -> f64 {
-        let view = look.view(spots, self.shape.yaw_rad);
+        let view = View::of(look, spots, self.shape.yaw_rad);
         let estimate = self.motion.estimate();
         let (centre_m, noise) = self.centre(&view, estimate.position_m);
         let spread = estimate.position_covariance + noise;

@@ -1,0 +1,174 @@
+//! What is seen of an object in the axes of its box.
+//!
+//! A sensor sees one or two sides of a vehicle. The edges that face it are measured, the others
+//! follow from the size, which `shape` knows.
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::look::Look;
+use super::rectangle::{Extent, turned};
+use super::spots::{Spot, places_m};
+
+/// A group of returns in the axes of a box.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View {
+    /// Extent along and across the yaw, relative to the origin of the frame.
+    low_m: [f64; 2],
+    high_m: [f64; 2],
+    /// Whether an end is the object's own: it faces the sensor and nothing stands before it.
+    low_is_edge: [bool; 2],
+    high_is_edge: [bool; 2],
+    /// Whether both ends of an axis can be seen, so that its extent is the object's.
+    is_whole: [bool; 2],
+    /// Only a cabin or a rider is seen: what is below reaches farther to both ends.
+    is_upper: bool,
+    sine: f64,
+    cosine: f64,
+    range_m: f64,
+}
+
+impl View {
+    /// What is seen of a group in the axes of a yaw.
+    pub(super) fn of(look: &Look, spots: &[Spot], yaw_rad: f64) -> Self {
+        let (sine, cosine) = libm::sincos(yaw_rad);
+        let extent = Extent::of(places_m(spots), sine, cosine);
+        let sensor = turned(&look.sensor_m.into(), sine, cosine);
+        let [low_m, high_m] =
+            [extent.low, extent.high].map(|end| [0, 1].map(|axis| sensor[axis] + end[axis]));
+        let sight = look.middle_m - look.sensor_m;
+        let left = Vector2::new(-sight.y, sight.x).normalize();
+        let left = turned(&left.into(), sine, cosine);
+        let mut view = Self {
+            low_m,
+            high_m,
+            low_is_edge: [false; 2],
+            high_is_edge: [false; 2],
+            is_whole: [false; 2],
+            is_upper: false,
+            sine,
+            cosine,
+            range_m: look.range_m,
+        };
+        for axis in 0..2 {
+            // An end that lies to a hidden side is not the object's own.
+            let hidden = |sign: f64| {
+                (look.is_cut[0] && left[axis] * sign > 0.35)
+                    || (look.is_cut[1] && -left[axis] * sign > 0.35)
+            };
+            let middle_m = 0.5 * (low_m[axis] + high_m[axis]);
+            let reach_m = 0.5 * (high_m[axis] - low_m[axis]);
+            let offset_m = sensor[axis] - middle_m;
+            // The side along this axis shows where the line of sight crosses it.
+            let is_across = left[axis].abs() > 0.35;
+            let faces_low = offset_m < -reach_m;
+            let faces_high = offset_m > reach_m;
+            view.low_is_edge[axis] = (faces_low || is_across) && !hidden(-1.0);
+            view.high_is_edge[axis] = (faces_high || is_across) && !hidden(1.0);
+            // Of an end that faces away only the corner is seen.
+            if faces_low && !(is_across && reach_m > 0.8) {
+                view.high_is_edge[axis] = false;
+            }
+            if faces_high && !(is_across && reach_m > 0.8) {
+                view.low_is_edge[axis] = false;
+            }
+            view.is_whole[axis] = is_across && !hidden(1.0) && !hidden(-1.0);
+        }
+        if look.is_upper {
+            view.is_whole[0] = false;
+            view.is_upper = true;
+        }
+        view
+    }
+
+    /// Length and width of what is seen.
+    pub(super) fn extent_m(&self) -> [f64; 2] {
+        [0, 1].map(|axis| self.high_m[axis] - self.low_m[axis])
+    }
+
+    /// Whether an extent is the whole of its side.
+    pub(super) fn is_whole(&self) -> [bool; 2] {
+        self.is_whole
+    }
+
+    /// Where the middle of a box of this size is, given where it is expected, and how sure
+    /// that is, as a covariance in the local frame.
+    pub(super) fn centre(
+        &self,
+        size_m: [f64; 2],
+        size_deviation_m: [f64; 2],
+        expected_m: Vector2<f64>,
+    ) -> (Vector2<f64>, Matrix2<f64>) {
+        /// Standard deviation of an edge: noise of ranges and roundness of corners.
+        const EDGE_M: f64 = 0.07;
+        /// Share of what is missing below a cabin by which its middle is off the vehicle's.
+        const UPPER: f64 = 0.4;
+        /// Share of the length that reaches out below a cabin to either end.
+        const INSET: f64 = 0.1;
+        /// What half a step between columns adds for each metre of range.
+        const EDGE_PER_M: f64 = 0.002;
+        let expected = [
+            expected_m.x * self.cosine + expected_m.y * self.sine,
+            expected_m.y * self.cosine - expected_m.x * self.sine,
+        ];
+        let edge_m = EDGE_M + EDGE_PER_M * self.range_m;
+        let mut centre = [0.0; 2];
+        let mut deviation = [0.0; 2];
+        for axis in 0..2 {
+            let (low, high) = (self.low_m[axis], self.high_m[axis]);
+            let half_m = 0.5 * size_m[axis].max(high - low);
+            let unsure_m = 0.5 * size_deviation_m[axis];
+            let is_inset = self.is_upper && axis == 0;
+            let inset_m = if is_inset {
+                (INSET * size_m[axis]).min((half_m - 0.5 * (high - low)).max(0.0))
+            } else {
+                0.0
+            };
+            let edge_m = edge_m + inset_m;
+            (centre[axis], deviation[axis]) =
+                match (self.low_is_edge[axis], self.high_is_edge[axis]) {
+                    (true, true) if is_inset => {
+                        let slack_m = half_m - 0.5 * (high - low);
+                        (0.5 * (low + high), edge_m + UPPER * slack_m)
+                    }
+                    // Seen from end to end; if it is shorter than known, some of it was missed.
+                    (true, true) => {
+                        let missed_m = half_m - 0.5 * (high - low);
+                        (
+                            expected[axis].clamp(
+                                0.5 * (low + high) - 0.5 * missed_m,
+                                0.5 * (low + high) + 0.5 * missed_m,
+                            ),
+                            edge_m + 0.5 * missed_m,
+                        )
+                    }
+                    (true, false) => (low - inset_m + half_m, libm::hypot(edge_m, unsure_m)),
+                    (false, true) => (high + inset_m - half_m, libm::hypot(edge_m, unsure_m)),
+                    (false, false) => {
+                        let slack_m = half_m - 0.5 * (high - low);
+                        let middle = 0.5 * (low + high);
+                        (
+                            expected[axis].clamp(middle - slack_m, middle + slack_m),
+                            edge_m + slack_m,
+                        )
+                    }
+                };
+        }
+        let local = |u: f64, v: f64| {
+            Vector2::new(
+                u * self.cosine - v * self.sine,
+                u * self.sine + v * self.cosine,
+            )
+        };
+        let turn = Matrix2::new(self.cosine, -self.sine, self.sine, self.cosine);
+        let spread = Matrix2::new(
+            deviation[0] * deviation[0],
+            0.0,
+            0.0,
+            deviation[1] * deviation[1],
+        );
+        (
+            local(centre[0], centre[1]),
+            turn * spread * turn.transpose(),
+        )
+    }
+}
