@@ -127,7 +127,7 @@ fn assert_is_dbscan(scan: &Scan, ground: &[bool], parameters: &ClusterParameters
         let label = clusters.labels()[point];
         if truth.core[point] {
             assert_ne!(label, Clusters::NONE, "core point {point} is noise");
-            let component = &mut component_of_cluster[label as usize];
+            let component = &mut component_of_cluster[usize::from(label)];
             if *component == usize::MAX {
                 *component = truth.component[point];
             }

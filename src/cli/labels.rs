@@ -56,7 +56,7 @@ fn label(pipeline: &Pipeline, point: usize) -> i32 {
     } else {
         match pipeline.clusters().labels()[point] {
             Clusters::NONE => NOISE,
-            cluster => FIRST_CLUSTER + cluster,
+            cluster => FIRST_CLUSTER + i32::from(cluster),
         }
     }
 }

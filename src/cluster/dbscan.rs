@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::density::Density;
 use super::joining::Joiner;
 use super::returns::{Centre, FARTHEST, Returns, nearer};
-use super::runs::{Core, Runs};
+use super::runs::Core;
 use super::window::{Cone, Windows};
 use super::{ClusterParameters, Clusters};
 use crate::cloud::Scan;
@@ -22,7 +22,7 @@ pub struct Dbscan {
     border: Vec<Centre>,
     joiner: Joiner,
     /// Cluster of each run.
-    numbers: Vec<i32>,
+    numbers: Vec<u16>,
     clusters: Clusters,
 }
 
@@ -94,27 +94,29 @@ impl Dbscan {
         ends.clear();
         for (run, first) in partition.parents().iter().enumerate() {
             if *first as usize == run {
-                self.numbers.push(ends.len() as i32);
+                // There are no more than runs.
+                self.numbers.push(ends.len() as u16);
                 ends.push(0);
             } else {
                 self.numbers.push(self.numbers[*first as usize]);
             }
         }
         for (run, number) in runs.all().iter().zip(&self.numbers) {
-            ends[*number as usize] += run.columns().len();
+            ends[usize::from(*number)] += run.columns().len();
         }
     }
 
     /// A point that is no core point belongs to the cluster of the nearest core point that is
     /// its neighbour (of equally near ones, the first in the array), else to none.
     fn adopt_border_points(&mut self, scan: &Scan) {
-        let returns = self.density.returns(scan);
+        let (returns, _, members) = self.density.judged(scan);
         let runs = &mut self.joiner.runs;
         for centre in &self.border {
             let (_, core) = nearest(centre, &returns, &self.windows);
             if let Some(run) = runs.numbers(scan.len()).get(core).copied() {
-                self.clusters.ends[self.numbers[usize::from(run)] as usize] += 1;
+                self.clusters.ends[usize::from(self.numbers[usize::from(run)])] += 1;
                 runs.adopt(centre.point, core);
+                members[centre.point] = true;
             }
         }
     }
@@ -132,16 +134,15 @@ impl Dbscan {
             total += std::mem::replace(end, total);
         }
         points.resize(total, 0);
+        labels.clear();
         labels.resize(len, Clusters::NONE);
-        let runs = self.joiner.runs.numbers(len).iter().zip(labels);
-        for (point, (run, label)) in runs.enumerate() {
-            *label = Clusters::NONE;
-            if *run != Runs::NONE {
-                *label = self.numbers[usize::from(*run)];
-                let end = &mut ends[*label as usize];
-                points[*end] = point as u32;
-                *end += 1;
-            }
+        let runs = self.joiner.runs.numbers(len);
+        for point in marked(&self.density.is_core[..len]) {
+            let label = self.numbers[usize::from(runs[point])];
+            labels[point] = label;
+            let end = &mut ends[usize::from(label)];
+            points[*end] = point as u32;
+            *end += 1;
         }
     }
 }

@@ -14,23 +14,24 @@ use crate::float::least;
 /// once.
 #[derive(Debug, Clone)]
 pub(super) struct Density {
-    /// To the right, if it is looked at; else infinity.
-    x_m: Box<[f32; CAPACITY]>,
+    /// Square of the distance within which others are neighbours; negative if it is not looked at.
     eps_squared: Box<[f32; CAPACITY]>,
-    /// Neighbours that were counted so far.
-    close: Box<[f32; CAPACITY]>,
+    /// Neighbours that were counted so far, of the points of a chunk and the next one.
+    close: Box<[f32; 2 * CHUNK]>,
     /// Which of many pairs are neighbours, while they are counted.
     near: Box<[f32; CHUNK]>,
     /// Whether it is a neighbour of the point in its layer, in the column before.
     pub(super) follows: Box<[bool; CAPACITY]>,
     /// Whether it is a neighbour of the next point of the array, which is the one above it.
     pub(super) meets: Box<[bool; CAPACITY]>,
-    /// Whether it is a core point.
+    /// Whether it is a core point; at the end, whether it is of a cluster at all.
     pub(super) is_core: Box<[bool; CAPACITY]>,
     /// Whether the neighbours that were counted do not suffice to call it one.
     is_open: Box<[bool; CAPACITY]>,
 }
 
+/// No square of a distance: nothing is within it.
+const NOT_TAKEN: f32 = -1.0;
 /// Points that are looked at together, so that they stay in the nearest cache.
 const CHUNK: usize = 32 * MAX_LAYERS;
 /// In the next column.
@@ -54,12 +55,10 @@ const _: () = assert!(CHUNK > 4 * MAX_LAYERS);
 
 impl Density {
     pub(super) fn new() -> Self {
-        let zeros = || Box::new([0.0; CAPACITY]);
         let never = || Box::new([false; CAPACITY]);
         Self {
-            x_m: zeros(),
-            eps_squared: zeros(),
-            close: zeros(),
+            eps_squared: Box::new([NOT_TAKEN; CAPACITY]),
+            close: Box::new([0.0; 2 * CHUNK]),
             near: Box::new([0.0; CHUNK]),
             follows: never(),
             meets: never(),
@@ -70,7 +69,7 @@ impl Density {
 
     /// The points that are looked at.
     pub(super) fn returns<'a>(&'a self, scan: &'a Scan) -> Returns<'a> {
-        Returns::of(scan, &self.x_m[..], &self.eps_squared[..])
+        Returns::of(scan, &self.eps_squared[..])
     }
 
     /// The points that are looked at, which of them are open, and which are core points.
@@ -78,7 +77,7 @@ impl Density {
         &'a mut self,
         scan: &'a Scan,
     ) -> (Returns<'a>, &'a [bool], &'a mut [bool]) {
-        let returns = Returns::of(scan, &self.x_m[..], &self.eps_squared[..]);
+        let returns = Returns::of(scan, &self.eps_squared[..]);
         let len = scan.len();
         (returns, &self.is_open[..len], &mut self.is_core[..len])
     }
@@ -95,6 +94,7 @@ impl Density {
         let len = scan.len();
         let chunk = |begin: usize| begin.min(len)..(begin + CHUNK).min(len);
         self.take(scan, (ground, heights_m), chunk(0), parameters);
+        self.close.fill(1.0);
         for begin in (0..len).step_by(CHUNK) {
             self.take(scan, (ground, heights_m), chunk(begin + CHUNK), parameters);
             let pairs = PAIRS.iter().filter(|(columns, _)| *columns <= few);
@@ -103,6 +103,8 @@ impl Density {
             }
             // No later pair has a point of this chunk.
             self.judge(scan, chunk(begin), parameters);
+            self.close.copy_within(CHUNK.., 0);
+            self.close[CHUNK..].fill(1.0);
         }
     }
 
@@ -115,22 +117,18 @@ impl Density {
         parameters: &ClusterParameters,
     ) {
         take(
-            (&scan.x_m()[chunk.clone()], &scan.range_m()[chunk.clone()]),
+            &scan.range_m()[chunk.clone()],
             (&ground[chunk.clone()], &heights_m[chunk.clone()]),
             parameters,
-            (
-                &mut self.x_m[chunk.clone()],
-                &mut self.eps_squared[chunk.clone()],
-            ),
+            &mut self.eps_squared[chunk.clone()],
         );
-        self.close[chunk.clone()].fill(1.0);
         self.follows[chunk.clone()].fill(false);
         self.meets[chunk].fill(false);
     }
 
     /// Counts the pairs of points so far apart of which the first is in a chunk.
     fn count_pairs(&mut self, scan: &Scan, chunk: Range<usize>, apart: usize) {
-        let returns = Returns::of(scan, &self.x_m[..], &self.eps_squared[..]);
+        let returns = Returns::of(scan, &self.eps_squared[..]);
         let end = chunk.end.min(scan.len().saturating_sub(apart));
         let pairs = chunk.start.min(end)..end;
         let near = &mut self.near[..pairs.len()];
@@ -147,8 +145,8 @@ impl Density {
     /// which are open.
     fn judge(&mut self, scan: &Scan, chunk: Range<usize>, parameters: &ClusterParameters) {
         judge(
-            (&self.x_m[chunk.clone()], &scan.range_m()[chunk.clone()]),
-            &self.close[chunk.clone()],
+            &scan.range_m()[chunk.clone()],
+            (&self.eps_squared[chunk.clone()], &self.close[..chunk.len()]),
             parameters,
             (
                 &mut self.is_core[chunk.clone()],
@@ -157,28 +155,26 @@ impl Density {
         );
     }
 
-    /// Puts all points at infinity that are no core points.
+    /// Looks at core points alone from here on.
     pub(super) fn keep_core(&mut self, len: usize) {
-        keep_core(&mut self.x_m[..len], &self.is_core[..len]);
+        keep_core(&mut self.eps_squared[..len], &self.is_core[..len]);
     }
 }
 
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn take(
-    (x_m, range_m): (&[f32], &[f32]),
+    range_m: &[f32],
     (ground, heights_m): (&[bool], &[f32]),
     parameters: &ClusterParameters,
-    (taken_m, eps_squared): (&mut [f32], &mut [f32]),
+    eps_squared: &mut [f32],
 ) {
-    let (range_m, ground) = (&range_m[..x_m.len()], &ground[..x_m.len()]);
-    let (heights_m, highest_m) = (&heights_m[..x_m.len()], parameters.highest_m as f32);
-    let (taken_m, eps_squared) = (&mut taken_m[..x_m.len()], &mut eps_squared[..x_m.len()]);
-    for point in 0..x_m.len() {
+    let (count, highest_m) = (range_m.len(), parameters.highest_m as f32);
+    let (ground, heights_m) = (&ground[..count], &heights_m[..count]);
+    let eps_squared = &mut eps_squared[..count];
+    for point in 0..count {
         let is_taken = (range_m[point] > 0.0) & !ground[point] & (heights_m[point] <= highest_m);
-        let x = x_m[point];
-        taken_m[point] = if is_taken { x } else { f32::INFINITY };
         let eps_m = parameters.eps_m(range_m[point]);
-        eps_squared[point] = eps_m * eps_m;
+        eps_squared[point] = if is_taken { eps_m * eps_m } else { NOT_TAKEN };
     }
 }
 
@@ -208,11 +204,11 @@ fn count_pairs(
         let is_near = dx * dx + dy * dy + dz * dz <= least(eps[pair], eps2[pair]);
         near[pair] = if is_near { 1.0 } else { 0.0 };
     }
-    let before = &mut close[first..][..count];
+    let before = &mut close[..count];
     for pair in 0..count {
         before[pair] += near[pair];
     }
-    let behind = &mut close[first + apart..][..count];
+    let behind = &mut close[apart..][..count];
     for pair in 0..count {
         behind[pair] += near[pair];
     }
@@ -228,15 +224,16 @@ fn flag(near: &[f32], flags: &mut [bool]) {
 
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn judge(
-    (x_m, range_m): (&[f32], &[f32]),
-    close: &[f32],
+    range_m: &[f32],
+    (eps_squared, close): (&[f32], &[f32]),
     parameters: &ClusterParameters,
     (is_core, is_open): (&mut [bool], &mut [bool]),
 ) {
-    let (range_m, close) = (&range_m[..x_m.len()], &close[..x_m.len()]);
-    let (is_core, is_open) = (&mut is_core[..x_m.len()], &mut is_open[..x_m.len()]);
-    for point in 0..x_m.len() {
-        let is_taken = x_m[point] < f32::INFINITY;
+    let count = range_m.len();
+    let (eps_squared, close) = (&eps_squared[..count], &close[..count]);
+    let (is_core, is_open) = (&mut is_core[..count], &mut is_open[..count]);
+    for point in 0..count {
+        let is_taken = eps_squared[point] >= 0.0;
         let suffices = close[point] > parameters.more_than(range_m[point]);
         is_core[point] = is_taken & suffices;
         is_open[point] = is_taken & !suffices;
@@ -244,11 +241,11 @@ fn judge(
 }
 
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-fn keep_core(x_m: &mut [f32], is_core: &[bool]) {
-    let is_core = &is_core[..x_m.len()];
-    for point in 0..x_m.len() {
-        let x = x_m[point];
-        x_m[point] = if is_core[point] { x } else { f32::INFINITY };
+fn keep_core(eps_squared: &mut [f32], is_core: &[bool]) {
+    let is_core = &is_core[..eps_squared.len()];
+    for point in 0..eps_squared.len() {
+        let eps = eps_squared[point];
+        eps_squared[point] = if is_core[point] { eps } else { NOT_TAKEN };
     }
 }
 

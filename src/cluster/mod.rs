@@ -94,14 +94,14 @@ impl ClusterParameters {
 /// Clusters of one revolution: labels on the array, and the points of each, in array order.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Clusters {
-    labels: Vec<i32>,
+    labels: Vec<u16>,
     points: Vec<u32>,
     ends: Vec<usize>,
 }
 
 impl Clusters {
     /// The label of a point that belongs to no cluster.
-    pub const NONE: i32 = -1;
+    pub const NONE: u16 = u16::MAX;
 
     /// How many clusters there are.
     pub fn len(&self) -> usize {
@@ -114,7 +114,7 @@ impl Clusters {
     }
 
     /// The cluster of every point of the scan, or [`Clusters::NONE`].
-    pub fn labels(&self) -> &[i32] {
+    pub fn labels(&self) -> &[u16] {
         &self.labels
     }
 

@@ -8,15 +8,16 @@ use super::ClusterParameters;
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::float::{least, least_of};
 
-/// All points of a revolution, in array order. Those that are not looked at stand at infinity,
-/// where nothing is their neighbour.
+/// All points of a revolution, in array order. Nothing is a neighbour of those that are not looked
+/// at.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Returns<'a> {
     pub(super) x_m: &'a [f32],
     pub(super) y_m: &'a [f32],
     pub(super) z_m: &'a [f32],
     pub(super) range_m: &'a [f32],
-    /// Square of the distance within which others are neighbours, if they are farther off.
+    /// Square of the distance within which others are neighbours, if they are farther off; negative
+    /// for points that are not looked at.
     pub(super) eps_squared: &'a [f32],
 }
 
@@ -49,11 +50,11 @@ fn starts(layers: &Range<usize>) -> impl Iterator<Item = usize> + use<> {
 }
 
 impl<'a> Returns<'a> {
-    /// The points of a scan, if those that are looked at have these coordinates and distances.
-    pub(super) fn of(scan: &'a Scan, x_m: &'a [f32], eps_squared: &'a [f32]) -> Self {
+    /// The points of a scan, given the squares of the distances of their neighbours.
+    pub(super) fn of(scan: &'a Scan, eps_squared: &'a [f32]) -> Self {
         let len = scan.len();
         Self {
-            x_m: &x_m[..len],
+            x_m: scan.x_m(),
             y_m: scan.y_m(),
             z_m: scan.z_m(),
             range_m: scan.range_m(),

@@ -87,7 +87,7 @@ impl Strays {
 
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn mark_strays(
-    labels: &[i32],
+    labels: &[u16],
     ranges_m: &[f32],
     heights_m: &[f32],
     [low_m, high_m]: [f32; 2],
