@@ -27,6 +27,24 @@ pub(crate) fn marked(marks: &[bool]) -> impl Iterator<Item = usize> {
     })
 }
 
+/// How many are marked.
+pub(crate) fn count(marks: &[bool]) -> usize {
+    /// So many marks a byte can count.
+    const MOST: usize = u8::MAX as usize;
+    let (eights, rest) = marks.as_chunks::<8>();
+    let bytes = |eights: &[[bool; 8]]| -> u64 {
+        let words = eights
+            .iter()
+            .map(|eight| u64::from_le_bytes(eight.map(u8::from)));
+        words.sum()
+    };
+    let counted = eights
+        .chunks(MOST)
+        .flat_map(|eights| bytes(eights).to_le_bytes());
+    let counted: usize = counted.map(usize::from).sum();
+    counted + rest.iter().filter(|mark| **mark).count()
+}
+
 /// A bit for each mark, the first one lowest.
 fn bits(marks: &[bool; AT_ONCE]) -> u64 {
     /// Brings the lowest bits of eight bytes together in the highest byte, the first one lowest.
@@ -44,11 +62,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn no_byte_is_full_however_many_are_marked() {
+        assert_eq!(count(&[true; 9999]), 9999);
+    }
+
+    #[test]
     fn every_mark_is_found_also_behind_the_last_whole_word() {
         let all: Vec<usize> = (0..150).collect();
         for places in [vec![], vec![0], vec![7, 8, 63, 64, 149], all] {
             let marks: Vec<bool> = (0..150).map(|place| places.contains(&place)).collect();
             assert_eq!(marked(&marks).collect::<Vec<_>>(), places);
+            assert_eq!(count(&marks), places.len());
         }
     }
 }

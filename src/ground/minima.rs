@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::moments::{Positions, moments_near};
+use super::slices::slices;
 use super::{Plane, passes};
 use crate::cloud::{CAPACITY, MAX_LAYERS, Scan};
 use crate::float::least_of;
@@ -15,7 +16,7 @@ pub(super) struct Minima {
     /// The slice of each, and its coordinates.
     slices: Vec<usize>,
     at_m: [Vec<f32>; 3],
-    /// Of all points; infinity where they do not count.
+    /// Of the points of a slice; infinity where they do not count.
     heights_m: Vec<f32>,
 }
 
@@ -41,22 +42,24 @@ impl Minima {
         for segment in &mut self.segments {
             segment.clear();
         }
-        self.heights_m.resize(scan.len(), 0.0);
         let far_squared = (range_m * range_m) as f32;
-        passes::heights_nearby(scan, reference, far_squared, &mut self.heights_m);
-        let heights_m = self.heights_m.as_chunks::<MAX_LAYERS>().0;
-        for (column, heights_m) in heights_m.iter().enumerate() {
-            let slice = slice_of(scan, column, self.segments.len());
+        for (slice, columns) in slices(scan, self.segments.len()) {
+            let points = scan.index(columns.start, 0)..scan.index(columns.end, 0);
+            self.heights_m.resize(points.len(), 0.0);
+            passes::heights_nearby(scan, points, reference, far_squared, &mut self.heights_m);
             let segment = &mut self.segments[slice];
             let mut highest_m = highest_m(segment, self.per_segment);
-            if least_of(*heights_m) >= highest_m {
-                continue;
-            }
-            for (layer, above_m) in heights_m.iter().copied().enumerate() {
-                if above_m < highest_m {
-                    let point = scan.index(column, layer) as u32;
-                    insert(segment, self.per_segment, Minimum { above_m, point });
-                    highest_m = self::highest_m(segment, self.per_segment);
+            let heights_m = self.heights_m.as_chunks::<MAX_LAYERS>().0;
+            for (column, heights_m) in columns.zip(heights_m) {
+                if least_of(*heights_m) >= highest_m {
+                    continue;
+                }
+                for (layer, above_m) in heights_m.iter().copied().enumerate() {
+                    if above_m < highest_m {
+                        let point = scan.index(column, layer) as u32;
+                        insert(segment, self.per_segment, Minimum { above_m, point });
+                        highest_m = self::highest_m(segment, self.per_segment);
+                    }
                 }
             }
         }
@@ -100,13 +103,6 @@ impl Minima {
         let moments = moments_near(self.points(), 1, plane, distance_m as f32, f32::INFINITY);
         moments.count as usize
     }
-}
-
-/// The slice of a column by its azimuth, wherever the revolution begins.
-pub(super) fn slice_of(scan: &Scan, column: usize, segments: usize) -> usize {
-    let turns = scan.azimuth_rad(column) / std::f64::consts::TAU;
-    let part = turns - libm::floor(turns);
-    ((part * segments as f64) as usize).min(segments - 1)
 }
 
 /// What is as high as this does not belong to the lowest.

@@ -13,11 +13,14 @@ mod passes;
 mod plane;
 mod profile;
 mod ransac;
+mod slices;
 mod surface;
+mod votes;
 
 pub use plane::Plane;
 
 use crate::cloud::{CAPACITY, MAX_LAYERS, Scan};
+use crate::marks::count;
 use crate::parameter::{choices, parameters};
 use crate::random::Random;
 use crate::track::Rectangle;
@@ -142,7 +145,7 @@ pub struct Ground {
     heights_m: Vec<f32>,
     /// Horizontal distances of the points.
     distances_m: Vec<f32>,
-    /// Positions that are looked at closer.
+    /// Ground that ends, towards the next layer.
     marks: Vec<bool>,
 }
 
@@ -251,29 +254,35 @@ impl Ground {
         };
         self.heights_m.resize(scan.len(), 0.0);
         passes::heights(scan, plane, &mut self.heights_m);
-        if self.parameters.model == Model::Surface {
-            self.distances_m.resize(scan.len(), 0.0);
-            passes::distances(scan, &mut self.distances_m);
-            self.surface
-                .find(scan, &self.heights_m, &self.distances_m, vehicles);
-            for (columns, profile) in self.surface.stretches() {
-                let points = scan.index(columns.start, 0)..scan.index(columns.end, 0);
-                passes::lower(
-                    profile,
-                    &self.distances_m[points.clone()],
-                    &mut self.heights_m[points],
-                );
-            }
-        }
         self.mask.resize(scan.len(), false);
-        passes::mark(scan, &self.heights_m, band, &mut self.mask);
-        if self.parameters.model == Model::Surface {
-            self.spare_feet(scan);
-            for vehicle in vehicles {
-                self.spare_vehicle(scan, vehicle);
-            }
+        match self.parameters.model {
+            Model::Plane => passes::mark(scan.range_m(), &self.heights_m, band, &mut self.mask),
+            Model::Surface => self.mark_surface(scan, band, vehicles),
         }
-        self.mask.iter().filter(|ground| **ground).count()
+        count(&self.mask)
+    }
+
+    /// Lowers the heights to those above the surface, and marks what lies on it.
+    fn mark_surface(&mut self, scan: &Scan, band: Band, vehicles: &[Rectangle]) {
+        self.distances_m.resize(scan.len(), 0.0);
+        passes::distances(scan, &mut self.distances_m);
+        self.surface
+            .find(scan, &self.heights_m, &self.distances_m, vehicles);
+        self.marks.resize(scan.len(), false);
+        for (columns, profile) in self.surface.stretches() {
+            let points = scan.index(columns.start, 0)..scan.index(columns.end, 0);
+            let distances_m = &self.distances_m[points.clone()];
+            let heights_m = &mut self.heights_m[points.clone()];
+            let mask = &mut self.mask[points.clone()];
+            passes::lower(profile, distances_m, heights_m);
+            passes::mark(&scan.range_m()[points.clone()], heights_m, band, mask);
+            let marks = &mut self.marks[points];
+            passes::mark_edges(mask, heights_m, distances_m, (FOOT_M, FOOT_PER_M), marks);
+        }
+        self.spare_feet(scan);
+        for vehicle in vehicles {
+            self.spare_vehicle(scan, vehicle);
+        }
     }
 
     /// Takes the mark off what is clearly above the ground where a vehicle is expected: far
@@ -299,14 +308,6 @@ impl Ground {
     /// below one that rises steeply from there and is no ground. Feet of people, tyres, bumpers
     /// and the foot of a wall lie as near to the ground as its own bumps do.
     fn spare_feet(&mut self, scan: &Scan) {
-        self.marks.resize(scan.len(), false);
-        passes::mark_edges(
-            &self.mask,
-            &self.heights_m,
-            &self.distances_m,
-            (FOOT_M, FOOT_PER_M),
-            &mut self.marks,
-        );
         let columns = self.marks.as_chunks::<MAX_LAYERS>().0.iter().enumerate();
         let (ranges_m, _) = scan.range_m().as_chunks::<MAX_LAYERS>();
         let (heights_m, _) = self.heights_m.as_chunks::<MAX_LAYERS>();

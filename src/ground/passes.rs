@@ -1,5 +1,7 @@
 //! What is done with all points of a revolution at once. Written so that it vectorises.
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 
 use super::Plane;
@@ -19,15 +21,21 @@ pub(super) fn heights(scan: &Scan, plane: &Plane, heights_m: &mut [f32]) {
     }
 }
 
-/// Heights of the returns above a plane that are no farther than the root of `far_squared` away;
-/// infinity for the others.
+/// Heights of some returns above a plane, if they are no farther than the root of `far_squared`
+/// away; infinity for the others.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-pub(super) fn heights_nearby(scan: &Scan, plane: &Plane, far_squared: f32, heights_m: &mut [f32]) {
+pub(super) fn heights_nearby(
+    scan: &Scan,
+    points: Range<usize>,
+    plane: &Plane,
+    far_squared: f32,
+    heights_m: &mut [f32],
+) {
     let above_m = plane.heights();
-    let count = scan.len();
-    let (x_m, y_m, z_m) = (scan.x_m(), scan.y_m(), scan.z_m());
-    let (x_m, y_m, z_m) = (&x_m[..count], &y_m[..count], &z_m[..count]);
-    let range_m = &scan.range_m()[..count];
+    let count = points.len();
+    let [x_m, y_m, z_m] =
+        [scan.x_m(), scan.y_m(), scan.z_m()].map(|metres| &metres[points.clone()][..count]);
+    let range_m = &scan.range_m()[points.clone()][..count];
     let heights_m = &mut heights_m[..count];
     for point in 0..count {
         let (x, y, z) = (x_m[point], y_m[point], z_m[point]);
@@ -96,12 +104,11 @@ pub(super) struct Band {
     pub(super) with_below: bool,
 }
 
-/// Marks the returns that are ground.
+/// Marks the returns that are ground, given the ranges and heights of some.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-pub(super) fn mark(scan: &Scan, heights_m: &[f32], band: Band, mask: &mut [bool]) {
-    let count = scan.len();
-    let (ranges_m, heights_m) = (&scan.range_m()[..count], &heights_m[..count]);
-    let mask = &mut mask[..count];
+pub(super) fn mark(ranges_m: &[f32], heights_m: &[f32], band: Band, mask: &mut [bool]) {
+    let count = mask.len();
+    let (ranges_m, heights_m) = (&ranges_m[..count], &heights_m[..count]);
     for point in 0..count {
         let (range_m, above_m) = (ranges_m[point], heights_m[point]);
         let limit_m = band.near_m + band.per_m * range_m;

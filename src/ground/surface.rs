@@ -9,8 +9,9 @@
 use std::ops::Range;
 
 use super::lowest::{Lowest, MOST_COLUMNS, NO_LEVEL_M, Points};
-use super::minima::slice_of;
 use super::profile::Profile;
+use super::slices::slices;
+use super::votes::{VOTERS, elected};
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::track::{Outline, Rectangle};
 
@@ -21,8 +22,8 @@ pub(super) struct Surface {
     /// Per sector: its rings from the inside out.
     rings: Vec<[Ring; MAX_LAYERS]>,
     voted: Vec<[Ring; MAX_LAYERS]>,
-    /// Sector of every column.
-    sector_of: Vec<u16>,
+    /// The sectors of the revolution as it came through them, and their columns.
+    stretches: Vec<(usize, Range<usize>)>,
     profiles: Vec<Profile>,
     /// The lowest returns of each layer in one sector.
     lowest: Lowest,
@@ -58,10 +59,6 @@ const SPREAD_M: f32 = 0.03;
 const SPREAD: f32 = 2.0;
 /// Around a vehicle that is known, for its way during the sweep.
 const AROUND_VEHICLES_M: f64 = 0.6;
-/// Sectors to either side that vote on a level.
-const VOTERS: usize = 3;
-/// As many of them know a level that the sector itself cannot see.
-const FEWEST_VOTES: usize = 4;
 
 impl Surface {
     pub(super) fn new(sectors: usize) -> Self {
@@ -69,7 +66,8 @@ impl Surface {
             sectors,
             rings: vec![[Ring::default(); MAX_LAYERS]; sectors],
             voted: vec![[Ring::default(); MAX_LAYERS]; sectors],
-            sector_of: vec![],
+            // A sweep may come through a slice twice.
+            stretches: Vec::with_capacity(2 * sectors),
             profiles: vec![Profile::FLAT; sectors],
             lowest: Lowest::new(),
             candidates: vec![],
@@ -90,25 +88,20 @@ impl Surface {
             heights_m,
             distances_m,
         };
-        self.sector_of.clear();
-        let sectors = self.sectors;
-        let of_column = |column| slice_of(scan, column, sectors) as u16;
-        self.sector_of.extend((0..scan.columns()).map(of_column));
+        let mut stretches = std::mem::take(&mut self.stretches);
+        stretches.clear();
+        stretches.extend(slices(scan, self.sectors));
         for rings in &mut self.rings {
             *rings = [Ring::default(); MAX_LAYERS];
         }
-        let mut first = 0;
-        while first < scan.columns() {
-            let sector = self.sector_of[first];
-            let count = self.sector_of[first..]
-                .iter()
-                .take(MOST_COLUMNS)
-                .take_while(|other| **other == sector)
-                .count();
-            self.look_out(scan.azimuth_rad(first + count / 2), vehicles);
-            self.measure_sector(&points, first..first + count, sector as usize);
-            first += count;
+        for (sector, stretch) in &stretches {
+            for first in stretch.clone().step_by(MOST_COLUMNS) {
+                let columns = first..stretch.end.min(first + MOST_COLUMNS);
+                self.look_out(scan.azimuth_rad(first + columns.len() / 2), vehicles);
+                self.measure_sector(&points, columns, *sector);
+            }
         }
+        self.stretches = stretches;
         for rings in &mut self.rings {
             follow(rings);
         }
@@ -190,50 +183,18 @@ impl Surface {
 
     /// The median of neighbouring sectors' levels, layer by layer.
     fn vote(&mut self) {
-        for layer in 0..MAX_LAYERS {
-            let is_known = self.rings.iter().any(|rings| rings[layer].distance_m > 0.0);
-            for sector in 0..self.sectors {
-                let ring = is_known.then(|| self.voted(sector, layer));
-                self.voted[sector][layer] = ring.unwrap_or_default();
-            }
-        }
-    }
-
-    fn voted(&self, sector: usize, layer: usize) -> Ring {
-        let own = self.rings[sector][layer];
-        let mut levels = [0.0f32; 2 * VOTERS + 1];
-        let mut count = 0;
-        let mut distance_m = 0.0;
-        for step in 0..=2 * VOTERS {
-            let neighbour = (sector + self.sectors + step - VOTERS) % self.sectors;
-            let ring = self.rings[neighbour][layer];
-            let is_alike = own.distance_m == 0.0
-                || (ring.distance_m - own.distance_m).abs() < 0.35 * own.distance_m;
-            if ring.distance_m > 0.0 && is_alike {
-                levels[count] = ring.level_m;
-                distance_m += ring.distance_m;
-                count += 1;
-            }
-        }
-        if count == 0 || count < FEWEST_VOTES && own.distance_m == 0.0 {
-            return Ring::default();
-        }
-        let levels = &mut levels[..count];
-        levels.sort_unstable_by(f32::total_cmp);
-        Ring {
-            distance_m: distance_m / count as f32,
-            level_m: levels[count / 2],
+        let sectors = self.sectors;
+        for (sector, voted) in self.voted.iter_mut().enumerate() {
+            let neighbour = |step| (sector + sectors + step - VOTERS) % sectors;
+            let voters = std::array::from_fn(|step| self.rings[neighbour(step)]);
+            *voted = elected(&voters);
         }
     }
 
     /// The ground along the columns: stretches of them, and how high it is there above the plane.
     pub(super) fn stretches(&self) -> impl Iterator<Item = (Range<usize>, &Profile)> {
-        let mut first = 0;
-        self.sector_of.chunk_by(|a, b| a == b).map(move |columns| {
-            let stretch = first..first + columns.len();
-            first = stretch.end;
-            (stretch, &self.profiles[columns[0] as usize])
-        })
+        let stretches = self.stretches.iter();
+        stretches.map(|(sector, columns)| (columns.clone(), &self.profiles[*sector]))
     }
 }
 

@@ -1,0 +1,118 @@
+//! Neighbouring sectors vote on how high the ground is in one, in all layers at once.
+
+use multiversion::multiversion;
+
+use super::surface::Ring;
+use crate::cloud::MAX_LAYERS;
+use crate::float::{greatest, least};
+
+/// Sectors to either side that vote on a level.
+pub(super) const VOTERS: usize = 3;
+/// All that vote: they and the sector itself, which is in the middle.
+const ALL: usize = 2 * VOTERS + 1;
+/// As many of them know a level that the sector itself cannot see.
+const FEWEST_VOTES: f32 = 4.0;
+/// Part of its distance by which the ring of another sector may be nearer or farther.
+const ALIKE: f32 = 0.35;
+
+/// The median level of those that know one and meet the ground about as far away, and their mean
+/// distance, for every layer.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub(super) fn elected(voters: &[[Ring; MAX_LAYERS]; ALL]) -> [Ring; MAX_LAYERS] {
+    let own = &voters[VOTERS];
+    let mut levels_m = [[f32::INFINITY; MAX_LAYERS]; ALL];
+    let (mut total_m, mut votes) = ([0.0; MAX_LAYERS], [0.0; MAX_LAYERS]);
+    for voter in 0..ALL {
+        for layer in 0..MAX_LAYERS {
+            let Ring {
+                distance_m,
+                level_m,
+            } = voters[voter][layer];
+            let own_m = own[layer].distance_m;
+            let is_alike = (own_m == 0.0) | ((distance_m - own_m).abs() < ALIKE * own_m);
+            let votes_for_it = (distance_m > 0.0) & is_alike;
+            levels_m[voter][layer] = if votes_for_it { level_m } else { f32::INFINITY };
+            total_m[layer] += if votes_for_it { distance_m } else { 0.0 };
+            votes[layer] += if votes_for_it { 1.0 } else { 0.0 };
+        }
+    }
+    sort(&mut levels_m);
+    let mut elected = [Ring::default(); MAX_LAYERS];
+    for layer in 0..MAX_LAYERS {
+        let votes = votes[layer];
+        let is_seen = own[layer].distance_m > 0.0;
+        if votes >= FEWEST_VOTES || votes > 0.0 && is_seen {
+            elected[layer] = Ring {
+                distance_m: total_m[layer] / votes,
+                level_m: levels_m[votes as usize / 2][layer],
+            };
+        }
+    }
+    elected
+}
+
+/// Sorts the levels of each layer, lowest first, by exchanging neighbours in turns.
+#[inline(always)]
+fn sort(levels_m: &mut [[f32; MAX_LAYERS]; ALL]) {
+    for turn in 0..ALL {
+        for place in (turn % 2..ALL - 1).step_by(2) {
+            let [a, b] = [levels_m[place], levels_m[place + 1]];
+            for layer in 0..MAX_LAYERS {
+                levels_m[place][layer] = least(a[layer], b[layer]);
+                levels_m[place + 1][layer] = greatest(a[layer], b[layer]);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ring(distance_m: f32, level_m: f32) -> Ring {
+        Ring {
+            distance_m,
+            level_m,
+        }
+    }
+
+    /// What is elected in one layer, given what all sectors see there.
+    fn of_layer(seen: [Ring; ALL]) -> Ring {
+        let mut voters = [[Ring::default(); MAX_LAYERS]; ALL];
+        for (voter, ring) in voters.iter_mut().zip(seen) {
+            voter[5] = ring;
+        }
+        let elected = elected(&voters);
+        let others = elected.iter().enumerate().filter(|(layer, _)| *layer != 5);
+        assert!(others.into_iter().all(|(_, ring)| ring.distance_m == 0.0));
+        elected[5]
+    }
+
+    #[test]
+    fn the_median_is_elected_by_those_that_are_as_far_away() {
+        let levels_m = [0.4, 0.1, -0.2, 0.9, 0.3, 0.0, 0.2];
+        let elected = of_layer(levels_m.map(|level_m| ring(10.0, level_m)));
+        assert_eq!((elected.distance_m, elected.level_m), (10.0, 0.2));
+
+        // Two are too far away, one knows nothing: four are left.
+        let mut seen = levels_m.map(|level_m| ring(10.0, level_m));
+        (seen[0].distance_m, seen[2].distance_m) = (14.0, 6.0);
+        seen[6] = Ring::default();
+        seen[1].distance_m = 12.0;
+        let elected = of_layer(seen);
+        assert_eq!((elected.distance_m, elected.level_m), (10.5, 0.3));
+    }
+
+    #[test]
+    fn a_sector_that_sees_nothing_believes_four_others_and_no_fewer() {
+        let mut seen = [ring(10.0, 0.1); ALL];
+        (seen[3], seen[0], seen[6]) = (Ring::default(), Ring::default(), ring(30.0, 0.1));
+        assert_eq!(of_layer(seen).distance_m, 14.0);
+        (seen[5], seen[6]) = (Ring::default(), Ring::default());
+        assert_eq!(of_layer(seen).distance_m, 0.0);
+        // It believes its own eyes, though.
+        seen = [Ring::default(); ALL];
+        seen[3] = ring(10.0, 0.1);
+        assert_eq!(of_layer(seen).level_m, 0.1);
+    }
+}
