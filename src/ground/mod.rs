@@ -232,7 +232,7 @@ impl Ground {
     /// The plane fitted to the returns near it, again and again.
     fn refined(&self, scan: &Scan, plane: Plane) -> Plane {
         /// Neighbouring columns meet the same road.
-        const EVERY: usize = 2;
+        const EVERY: usize = 4;
         let near_m = self.parameters.inlier_distance_m as f32;
         let far_squared = self.parameters.candidate_range_m.powi(2) as f32;
         let points = Positions {
