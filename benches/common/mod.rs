@@ -110,18 +110,28 @@ mod mark {
 
 /// What is timed one by one.
 const PARTS: usize = 7;
+/// Those that are done when the objects are sent.
+const BEFORE_MAP: usize = 5;
 /// Names of what is timed: the pipeline's steps to the frames of the objects, then the map and
-/// the frames of its tiles, and all of it.
-pub(crate) const NAMES: [&str; PARTS + 1] = [
-    "cloud", "ground", "cluster", "track", "objects", "grid", "tiles", "whole",
+/// the frames of its tiles, all but the map, and all of it.
+pub(crate) const NAMES: [&str; PARTS + 2] = [
+    "cloud",
+    "ground",
+    "cluster",
+    "track",
+    "objects",
+    "grid",
+    "tiles",
+    "without map",
+    "whole",
 ];
 /// Revolutions before everything is warm.
 pub(crate) const WARM: usize = 5;
 
 /// Times of every part in microseconds, a list each as in [`NAMES`].
-pub(crate) fn drive(frames: &[Vec<u8>], configuration: &Configuration) -> [Vec<f64>; PARTS + 1] {
+pub(crate) fn drive(frames: &[Vec<u8>], configuration: &Configuration) -> [Vec<f64>; PARTS + 2] {
     let mut pipeline = Pipeline::new(configuration, 0);
-    let mut times_us: [Vec<f64>; PARTS + 1] = Default::default();
+    let mut times_us: [Vec<f64>; PARTS + 2] = Default::default();
     for frame in frames {
         mark::step_begins();
         let begin = cpu_time();
@@ -143,12 +153,14 @@ pub(crate) fn drive(frames: &[Vec<u8>], configuration: &Configuration) -> [Vec<f
         done(&mut ends);
         black_box(pipeline.publish_map(Time::ZERO).count());
         done(&mut ends);
+        let us = |from: Duration, end: Duration| (end - from).as_secs_f64() * 1e6;
         let mut from = begin;
-        for (part, end) in ends.into_iter().enumerate() {
-            times_us[part].push((end - from).as_secs_f64() * 1e6);
-            from = end;
+        for (part, end) in ends.iter().enumerate() {
+            times_us[part].push(us(from, *end));
+            from = *end;
         }
-        times_us[PARTS].push((from - begin).as_secs_f64() * 1e6);
+        times_us[PARTS].push(us(begin, ends[BEFORE_MAP - 1]));
+        times_us[PARTS + 1].push(us(begin, from));
     }
     times_us.map(|times_us| times_us[WARM..].to_vec())
 }

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::moments::{Positions, moments_near};
 use super::slices::slices;
 use super::{Plane, passes};
-use crate::cloud::{CAPACITY, MAX_LAYERS, Scan};
+use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, Scan};
 use crate::float::least_of;
 
 /// The lowest returns, slice by slice. The buffers are made once.
@@ -16,8 +16,8 @@ pub(super) struct Minima {
     /// The slice of each, and its coordinates.
     slices: Vec<usize>,
     at_m: [Vec<f32>; 3],
-    /// Of the points of a slice; infinity where they do not count.
-    heights_m: Vec<f32>,
+    /// Of the points of a slice that are looked at; infinity where they do not count.
+    heights_m: Vec<[f32; MAX_LAYERS]>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -33,24 +33,25 @@ impl Minima {
             segments: vec![Vec::with_capacity(per_segment); segments],
             slices: Vec::with_capacity(segments * per_segment),
             at_m: std::array::from_fn(|_| Vec::with_capacity(segments * per_segment)),
-            heights_m: Vec::with_capacity(CAPACITY),
+            heights_m: Vec::with_capacity(MAX_COLUMNS),
         }
     }
 
-    /// Gathers the returns of each slice that are lowest above `reference`.
-    pub(super) fn gather(&mut self, scan: &Scan, reference: &Plane, range_m: f64) {
+    /// Gathers the returns of each slice that are lowest above `reference`, within `range_m`, in
+    /// one of `every` so many columns.
+    pub(super) fn gather(&mut self, scan: &Scan, reference: &Plane, range_m: f64, every: usize) {
         for segment in &mut self.segments {
             segment.clear();
         }
         let far_squared = (range_m * range_m) as f32;
         for (slice, columns) in slices(scan, self.segments.len()) {
-            let points = scan.index(columns.start, 0)..scan.index(columns.end, 0);
-            self.heights_m.resize(points.len(), 0.0);
-            passes::heights_nearby(scan, points, reference, far_squared, &mut self.heights_m);
+            let columns = columns.step_by(every);
+            self.heights_m.resize(columns.len(), [0.0; MAX_LAYERS]);
+            let heights_m = &mut self.heights_m;
+            passes::heights_nearby(scan, columns.clone(), reference, far_squared, heights_m);
             let segment = &mut self.segments[slice];
             let mut highest_m = highest_m(segment, self.per_segment);
-            let heights_m = self.heights_m.as_chunks::<MAX_LAYERS>().0;
-            for (column, heights_m) in columns.zip(heights_m) {
+            for (column, heights_m) in columns.zip(&self.heights_m) {
                 if least_of(*heights_m) >= highest_m {
                     continue;
                 }
@@ -136,7 +137,7 @@ mod tests {
             }
         });
         let mut minima = Minima::new(36, 10);
-        minima.gather(&scan, &Plane::level(0.0), 25.0);
+        minima.gather(&scan, &Plane::level(0.0), 25.0, 1);
         assert_eq!(minima.len(), 18 * 10);
         let lowest = |segment| {
             let of_slice = (0..minima.len())
@@ -148,5 +149,19 @@ mod tests {
         };
         let expected = -5.99 * 15f64.to_radians().sin();
         assert!((lowest(9) - expected).abs() < 1e-4);
+    }
+
+    #[test]
+    fn columns_between_those_that_are_looked_at_give_none() {
+        let scan = scan_of(
+            360,
+            |column, _| if column % 10 % 4 == 0 { 900 } else { 500 },
+        );
+        let mut minima = Minima::new(36, 64);
+        minima.gather(&scan, &Plane::level(0.0), 25.0, 4);
+        // Ten columns of a slice, of which three are looked at.
+        assert_eq!(minima.len(), 36 * 3 * MAX_LAYERS);
+        let mut ranges_m = (0..minima.len()).map(|n| minima.get(n).1.norm());
+        assert!(ranges_m.all(|range_m| range_m > 8.9));
     }
 }

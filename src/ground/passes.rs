@@ -1,5 +1,6 @@
 //! What is done with all points of a revolution at once. Written so that it vectorises.
 
+use std::iter::StepBy;
 use std::ops::Range;
 
 use multiversion::multiversion;
@@ -21,27 +22,28 @@ pub(super) fn heights(scan: &Scan, plane: &Plane, heights_m: &mut [f32]) {
     }
 }
 
-/// Heights of some returns above a plane, if they are no farther than the root of `far_squared`
-/// away; infinity for the others.
+/// Heights of the returns of some columns above a plane, if they are no farther than the root of
+/// `far_squared` away; infinity for the others.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 pub(super) fn heights_nearby(
     scan: &Scan,
-    points: Range<usize>,
+    columns: StepBy<Range<usize>>,
     plane: &Plane,
     far_squared: f32,
-    heights_m: &mut [f32],
+    heights_m: &mut [[f32; MAX_LAYERS]],
 ) {
     let above_m = plane.heights();
-    let count = points.len();
-    let [x_m, y_m, z_m] =
-        [scan.x_m(), scan.y_m(), scan.z_m()].map(|metres| &metres[points.clone()][..count]);
-    let range_m = &scan.range_m()[points.clone()][..count];
-    let heights_m = &mut heights_m[..count];
-    for point in 0..count {
-        let (x, y, z) = (x_m[point], y_m[point], z_m[point]);
-        let is_near = (x * x + y * y <= far_squared) & (range_m[point] > 0.0);
-        let height_m = above_m(x, y, z);
-        heights_m[point] = if is_near { height_m } else { f32::INFINITY };
+    let [x_m, y_m, z_m, ranges_m] = [scan.x_m(), scan.y_m(), scan.z_m(), scan.range_m()]
+        .map(|metres| metres.as_chunks::<MAX_LAYERS>().0);
+    for (heights_m, column) in heights_m.iter_mut().zip(columns) {
+        let (x_m, y_m) = (&x_m[column], &y_m[column]);
+        let (z_m, ranges_m) = (&z_m[column], &ranges_m[column]);
+        for layer in 0..MAX_LAYERS {
+            let (x, y, z) = (x_m[layer], y_m[layer], z_m[layer]);
+            let is_near = (x * x + y * y <= far_squared) & (ranges_m[layer] > 0.0);
+            let height_m = above_m(x, y, z);
+            heights_m[layer] = if is_near { height_m } else { f32::INFINITY };
+        }
     }
 }
 
