@@ -38,7 +38,7 @@ impl Minima {
     }
 
     /// Gathers the returns of each slice that are lowest above `reference`, within `range_m`, in
-    /// one of `every` so many columns.
+    /// the first of each `every` columns of a slice.
     pub(super) fn gather(&mut self, scan: &Scan, reference: &Plane, range_m: f64, every: usize) {
         for segment in &mut self.segments {
             segment.clear();

@@ -21,8 +21,8 @@ pub(super) fn slices(scan: &Scan, count: usize) -> impl Iterator<Item = (usize, 
         }
         let slice = slice_of(scan, begin, count);
         // The first one may be cut off.
-        first += if begin == 0 { 1 } else { sure };
-        first = first.min(scan.columns());
+        let known = if begin == 0 { 1 } else { sure };
+        first = first.saturating_add(known).min(scan.columns());
         while first < scan.columns() && slice_of(scan, first, count) == slice {
             first += 1;
         }
