@@ -55,6 +55,8 @@ pub mod tally;
 
 // Comparisons of floats that vectorise.
 mod float;
+
+// Marks on many points.
 mod marks;
 
 // What belongs together, found by joining.

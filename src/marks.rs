@@ -5,20 +5,13 @@ const AT_ONCE: usize = 64;
 
 /// The places that are marked, in order.
 pub(crate) fn marked(marks: &[bool]) -> impl Iterator<Item = usize> {
-    let (chunks, rest) = marks.as_chunks::<AT_ONCE>();
-    let mut last = [false; AT_ONCE];
-    last[..rest.len()].copy_from_slice(rest);
-    let mut chunks = chunks.iter();
-    let mut last = Some(last);
+    let mut words = words(marks);
     let mut begin = 0;
     // Those that were given are taken out.
     let mut word = 0u64;
     std::iter::from_fn(move || {
         while word == 0 {
-            word = match chunks.next() {
-                Some(chunk) => bits(chunk),
-                None => bits(&last.take()?),
-            };
+            word = words.next()?;
             begin += AT_ONCE;
         }
         let place = begin - AT_ONCE + word.trailing_zeros() as usize;
@@ -29,20 +22,16 @@ pub(crate) fn marked(marks: &[bool]) -> impl Iterator<Item = usize> {
 
 /// How many are marked.
 pub(crate) fn count(marks: &[bool]) -> usize {
-    /// So many marks a byte can count.
-    const MOST: usize = u8::MAX as usize;
-    let (eights, rest) = marks.as_chunks::<8>();
-    let bytes = |eights: &[[bool; 8]]| -> u64 {
-        let words = eights
-            .iter()
-            .map(|eight| u64::from_le_bytes(eight.map(u8::from)));
-        words.sum()
-    };
-    let counted = eights
-        .chunks(MOST)
-        .flat_map(|eights| bytes(eights).to_le_bytes());
-    let counted: usize = counted.map(usize::from).sum();
-    counted + rest.iter().filter(|mark| **mark).count()
+    words(marks).map(|word| word.count_ones() as usize).sum()
+}
+
+/// A bit for each mark, the first one lowest; the last word is filled up with none.
+fn words(marks: &[bool]) -> impl Iterator<Item = u64> {
+    let (chunks, rest) = marks.as_chunks::<AT_ONCE>();
+    let mut last = [false; AT_ONCE];
+    last[..rest.len()].copy_from_slice(rest);
+    let last = std::iter::once_with(move || bits(&last));
+    chunks.iter().map(bits).chain(last)
 }
 
 /// A bit for each mark, the first one lowest.
@@ -62,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_byte_is_full_however_many_are_marked() {
+    fn all_are_counted_however_many_are_marked() {
         assert_eq!(count(&[true; 9999]), 9999);
     }
 

@@ -303,12 +303,26 @@ pub(crate) mod tests {
 
     /// A scan of centimetres, `columns` around the circle.
     pub(crate) fn scan_of(columns: usize, distance_cm: impl Fn(usize, usize) -> u16) -> Scan {
+        scan_from(0.0, 360.0 / columns as f64, columns, distance_cm)
+    }
+
+    /// The same from an azimuth on, in degrees, and so many from column to column.
+    pub(crate) fn scan_from(
+        start_deg: f64,
+        step_deg: f64,
+        columns: usize,
+        distance_cm: impl Fn(usize, usize) -> u16,
+    ) -> Scan {
         let distances: Vec<u8> = (0..columns * MAX_LAYERS)
             .flat_map(|point| distance_cm(point / MAX_LAYERS, point % MAX_LAYERS).to_be_bytes())
             .collect();
         let mut scan = Scan::default();
         scan.fill(
-            &revolution(&distances),
+            &Revolution {
+                start_deg,
+                step_deg,
+                ..revolution(&distances)
+            },
             &CloudParameters::profile(Profile::Default),
         );
         scan

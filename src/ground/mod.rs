@@ -1,10 +1,11 @@
 //! Step three: the ground, and which returns lie on it (thesis section 4.1.1).
 //!
-//! `minima` gathers the lowest returns of every pie slice, `ransac` finds the plane that most
-//! of them lie on, `plane` has the geometry, `moments` sums over points for it. `surface` follows
-//! the heights above and below that plane outward into a `profile` for each direction, `lowest`
-//! says where each layer meets it, `passes` is what is done with all points at once, and this file
-//! follows the plane from revolution to revolution and marks the points.
+//! `slices` cuts the revolution like a pie, `minima` gathers the lowest returns of every slice,
+//! `ransac` finds the plane that most of them lie on, `plane` has the geometry, `moments` sums over
+//! points for it. `surface` follows the heights above and below that plane outward: `lowest` says
+//! where each layer meets it, neighbours have their `votes`, and a `profile` is what comes of it for
+//! each direction. `passes` is what is done with many points at once, and this file follows the
+//! plane from revolution to revolution and marks the points.
 
 mod lowest;
 mod minima;
@@ -20,7 +21,7 @@ mod votes;
 pub use plane::Plane;
 
 use crate::cloud::{CAPACITY, MAX_LAYERS, Scan};
-use crate::marks::count;
+use crate::marks;
 use crate::parameter::{choices, parameters};
 use crate::random::Random;
 use crate::track::Rectangle;
@@ -148,7 +149,7 @@ pub struct Ground {
     /// Horizontal distances of the points.
     distances_m: Vec<f32>,
     /// Ground that ends, towards the next layer.
-    marks: Vec<bool>,
+    edges: Vec<bool>,
 }
 
 /// Sectors in which the surface is followed, of 5 degrees each.
@@ -174,7 +175,7 @@ impl Ground {
             surface: Surface::new(SECTORS),
             heights_m: Vec::with_capacity(CAPACITY),
             distances_m: Vec::with_capacity(CAPACITY),
-            marks: Vec::with_capacity(CAPACITY),
+            edges: Vec::with_capacity(CAPACITY),
         }
     }
 
@@ -265,7 +266,7 @@ impl Ground {
             Model::Plane => passes::mark(scan.range_m(), &self.heights_m, band, &mut self.mask),
             Model::Surface => self.mark_surface(scan, band, vehicles),
         }
-        count(&self.mask)
+        marks::count(&self.mask)
     }
 
     /// Lowers the heights to those above the surface, and marks what lies on it.
@@ -274,16 +275,16 @@ impl Ground {
         passes::distances(scan, &mut self.distances_m);
         self.surface
             .find(scan, &self.heights_m, &self.distances_m, vehicles);
-        self.marks.resize(scan.len(), false);
-        for (columns, profile) in self.surface.stretches() {
+        self.edges.resize(scan.len(), false);
+        for (columns, profile) in self.surface.stretches(scan) {
             let points = scan.index(columns.start, 0)..scan.index(columns.end, 0);
             let distances_m = &self.distances_m[points.clone()];
             let heights_m = &mut self.heights_m[points.clone()];
             let mask = &mut self.mask[points.clone()];
             passes::lower(profile, distances_m, heights_m);
             passes::mark(&scan.range_m()[points.clone()], heights_m, band, mask);
-            let marks = &mut self.marks[points];
-            passes::mark_edges(mask, heights_m, distances_m, (FOOT_M, FOOT_PER_M), marks);
+            let edges = &mut self.edges[points];
+            passes::mark_edges(mask, heights_m, distances_m, (FOOT_M, FOOT_PER_M), edges);
         }
         self.spare_feet(scan);
         for vehicle in vehicles {
@@ -314,7 +315,7 @@ impl Ground {
     /// below one that rises steeply from there and is no ground. Feet of people, tyres, bumpers
     /// and the foot of a wall lie as near to the ground as its own bumps do.
     fn spare_feet(&mut self, scan: &Scan) {
-        let columns = self.marks.as_chunks::<MAX_LAYERS>().0.iter().enumerate();
+        let columns = self.edges.as_chunks::<MAX_LAYERS>().0.iter().enumerate();
         let (ranges_m, _) = scan.range_m().as_chunks::<MAX_LAYERS>();
         let (heights_m, _) = self.heights_m.as_chunks::<MAX_LAYERS>();
         let (distances_m, _) = self.distances_m.as_chunks::<MAX_LAYERS>();

@@ -1,4 +1,4 @@
-//! What is done with all points of a revolution at once. Written so that it vectorises.
+//! What is done with many points of a revolution at once. Written so that it vectorises.
 
 use std::iter::StepBy;
 use std::ops::Range;

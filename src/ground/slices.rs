@@ -40,7 +40,7 @@ fn slice_of(scan: &Scan, column: usize, count: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cloud::tests::scan_of;
+    use crate::cloud::tests::{scan_from, scan_of};
 
     #[test]
     fn every_column_is_in_its_slice_and_slices_are_whole() {
@@ -52,22 +52,32 @@ mod tests {
             (1, 6),
             (0, 6),
         ] {
-            let scan = scan_of(columns, |_, _| 0);
-            let mut next = 0;
-            let mut last = None;
-            for (slice, stretch) in slices(&scan, count) {
-                assert_eq!(stretch.start, next);
-                assert!(!stretch.is_empty() && last != Some(slice));
-                for column in stretch.clone() {
-                    assert_eq!(
-                        slice_of(&scan, column, count),
-                        slice,
-                        "{columns} {count} {column}"
-                    );
-                }
-                (next, last) = (stretch.end, Some(slice));
-            }
-            assert_eq!(next, columns);
+            assert_slices_are_whole(&scan_of(columns, |_, _| 0), count);
         }
+        // From the end of a slice on, the other way round, and more than once around.
+        for (start_deg, step_deg, columns) in
+            [(4.0, 0.2, 1800), (3.0, -0.2, 1800), (1.0, 0.2, 1990)]
+        {
+            assert_slices_are_whole(&scan_from(start_deg, step_deg, columns, |_, _| 0), 72);
+        }
+    }
+
+    fn assert_slices_are_whole(scan: &Scan, count: usize) {
+        let mut next = 0;
+        let mut last = None;
+        for (slice, stretch) in slices(scan, count) {
+            assert_eq!(stretch.start, next);
+            assert!(!stretch.is_empty() && last != Some(slice));
+            for column in stretch.clone() {
+                let columns = scan.columns();
+                assert_eq!(
+                    slice_of(scan, column, count),
+                    slice,
+                    "{columns} {count} {column}"
+                );
+            }
+            (next, last) = (stretch.end, Some(slice));
+        }
+        assert_eq!(next, scan.columns());
     }
 }

@@ -22,8 +22,6 @@ pub(super) struct Surface {
     /// Per sector: its rings from the inside out.
     rings: Vec<[Ring; MAX_LAYERS]>,
     voted: Vec<[Ring; MAX_LAYERS]>,
-    /// The sectors of the revolution as it came through them, and their columns.
-    stretches: Vec<(usize, Range<usize>)>,
     profiles: Vec<Profile>,
     /// The lowest returns of each layer in one sector.
     lowest: Lowest,
@@ -66,8 +64,6 @@ impl Surface {
             sectors,
             rings: vec![[Ring::default(); MAX_LAYERS]; sectors],
             voted: vec![[Ring::default(); MAX_LAYERS]; sectors],
-            // A sweep may come through a slice twice.
-            stretches: Vec::with_capacity(2 * sectors),
             profiles: vec![Profile::FLAT; sectors],
             lowest: Lowest::new(),
             candidates: vec![],
@@ -88,20 +84,16 @@ impl Surface {
             heights_m,
             distances_m,
         };
-        let mut stretches = std::mem::take(&mut self.stretches);
-        stretches.clear();
-        stretches.extend(slices(scan, self.sectors));
         for rings in &mut self.rings {
             *rings = [Ring::default(); MAX_LAYERS];
         }
-        for (sector, stretch) in &stretches {
+        for (sector, stretch) in slices(scan, self.sectors) {
             for first in stretch.clone().step_by(MOST_COLUMNS) {
                 let columns = first..stretch.end.min(first + MOST_COLUMNS);
                 self.look_out(scan.azimuth_rad(first + columns.len() / 2), vehicles);
-                self.measure_sector(&points, columns, *sector);
+                self.measure_sector(&points, columns, sector);
             }
         }
-        self.stretches = stretches;
         for rings in &mut self.rings {
             follow(rings);
         }
@@ -192,9 +184,9 @@ impl Surface {
     }
 
     /// The ground along the columns: stretches of them, and how high it is there above the plane.
-    pub(super) fn stretches(&self) -> impl Iterator<Item = (Range<usize>, &Profile)> {
-        let stretches = self.stretches.iter();
-        stretches.map(|(sector, columns)| (columns.clone(), &self.profiles[*sector]))
+    pub(super) fn stretches(&self, scan: &Scan) -> impl Iterator<Item = (Range<usize>, &Profile)> {
+        let slices = slices(scan, self.sectors);
+        slices.map(|(sector, columns)| (columns, &self.profiles[sector]))
     }
 }
 
@@ -276,7 +268,7 @@ mod tests {
         distances(&scan, &mut distances_m);
         surface.find(&scan, &heights_m, &distances_m, &[]);
         for column in [10, 400, 1200] {
-            let mut stretches = surface.stretches();
+            let mut stretches = surface.stretches(&scan);
             let (_, profile) = stretches
                 .find(|(stretch, _)| stretch.contains(&column))
                 .unwrap();
