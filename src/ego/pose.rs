@@ -81,10 +81,16 @@ impl Placement {
     }
 
     /// From the sensor frame (x right, y forward) to the local frame.
-    pub fn local_m(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+    pub fn local_m(&self, place_m: [f64; 2]) -> [f64; 2] {
+        let [along_m, across_m] = self.turned(place_m);
+        [self.origin_m[0] + along_m, self.origin_m[1] + across_m]
+    }
+
+    /// The same of a direction.
+    pub fn turned(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [
-            self.origin_m[0] + x * self.cosine - y * self.sine,
-            self.origin_m[1] + x * self.sine + y * self.cosine,
+            x * self.cosine - y * self.sine,
+            x * self.sine + y * self.cosine,
         ]
     }
 
@@ -95,11 +101,6 @@ impl Placement {
             dx * self.cosine + dy * self.sine,
             dy * self.cosine - dx * self.sine,
         ]
-    }
-
-    /// Sine and cosine of its turn.
-    pub fn turn(&self) -> (f64, f64) {
-        (self.sine, self.cosine)
     }
 
     /// Where the sensor is.

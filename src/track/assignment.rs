@@ -15,6 +15,7 @@ pub(super) struct Candidate {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Assigner {
     pairs: Vec<Option<usize>>,
+    is_paired: Vec<bool>,
     /// Which rows, and behind them which columns, candidates connect.
     connected: Partition,
     /// The part that is solved: its rows, its columns, and their costs.
@@ -39,6 +40,7 @@ impl Assigner {
         forbidden: f64,
     ) -> &[Option<usize>] {
         refill(&mut self.pairs, rows, None);
+        refill(&mut self.is_paired, columns, false);
         self.connected.reset(rows + columns);
         candidates.retain(|pair| pair.cost < forbidden);
         for pair in candidates.iter() {
@@ -62,7 +64,10 @@ impl Assigner {
             }
             let pairs = self.part.solve(size, &self.cost, forbidden);
             for (row, column) in self.rows.iter().zip(pairs) {
-                self.pairs[*row] = column.map(|column| self.columns[column]);
+                if let Some(column) = column.map(|column| self.columns[column]) {
+                    self.pairs[*row] = Some(column);
+                    self.is_paired[column] = true;
+                }
             }
         }
         &self.pairs
@@ -71,6 +76,11 @@ impl Assigner {
     /// The column of each row, as they were paired last.
     pub(super) fn pairs(&self) -> &[Option<usize>] {
         &self.pairs
+    }
+
+    /// Whether a column has a row.
+    pub(super) fn is_paired(&self, column: usize) -> bool {
+        self.is_paired[column]
     }
 }
 
@@ -253,6 +263,11 @@ mod tests {
             taken.sort_unstable();
             taken.dedup();
             assert_eq!(taken.len(), count);
+            let all = 0..columns;
+            assert!(
+                all.clone()
+                    .all(|column| assigner.is_paired(column) == taken.contains(&column))
+            );
         }
     }
 

@@ -31,8 +31,9 @@ pub(super) struct Grouping {
     forecasts: Forecasts,
     near: Vec<usize>,
     claims: Claims,
-    /// The bounds of each group, and the one that it joins.
-    boxes: Vec<[Vector2<f64>; 2]>,
+    /// The groups that no track claims, and their bounds.
+    free: Vec<(usize, [Vector2<f64>; 2])>,
+    /// The group that each one joins.
     target: Vec<usize>,
     /// Group numbers of what was cut off structure, ascending.
     suspects: Vec<u32>,
@@ -213,42 +214,41 @@ impl Grouping {
 
     /// Joins free groups that stand close together and can be one vehicle.
     fn join_pieces(&mut self, tracks: &[Track], scene: &Scene<'_>) {
-        let (mut boxes, mut target) = (
-            std::mem::take(&mut self.boxes),
+        let (mut free, mut target) = (
+            std::mem::take(&mut self.free),
             std::mem::take(&mut self.target),
         );
-        boxes.clear();
-        boxes.extend(self.groups.iter().map(|group| self.bounds(group)));
+        free.clear();
+        for (number, group) in self.groups.iter().enumerate() {
+            if group.claimed_by.is_none() {
+                free.push((number, self.bounds(group)));
+            }
+        }
         target.clear();
         target.extend(0..self.groups.len());
         let mut joined = false;
-        for a in 0..self.groups.len() {
-            for b in a + 1..self.groups.len() {
-                let (first, second) = (&self.groups[a], &self.groups[b]);
-                if first.claimed_by.is_some() || second.claimed_by.is_some() {
-                    continue;
-                }
-                let gap = (boxes[b][0] - boxes[a][1]).sup(&(boxes[a][0] - boxes[b][1]));
+        for (place, (a, one)) in free.iter().enumerate() {
+            for (b, other) in &free[place + 1..] {
+                let gap = (other[0] - one[1]).sup(&(one[0] - other[1]));
                 if gap.sup(&Vector2::zeros()).norm() > GAP_M {
                     continue;
                 }
-                let whole = boxes[a][1].sup(&boxes[b][1]) - boxes[a][0].inf(&boxes[b][0]);
-                let is_wide = |side: [Vector2<f64>; 2]| (side[1] - side[0]).norm() > 1.0;
-                let one_is_wide = is_wide(boxes[a]) || is_wide(boxes[b]);
-                if whole.norm() <= LONGEST_JOINED_M && one_is_wide && target[b] == b {
-                    target[b] = target[a];
+                let whole = one[1].sup(&other[1]) - one[0].inf(&other[0]);
+                let is_wide = |side: &[Vector2<f64>; 2]| (side[1] - side[0]).norm() > 1.0;
+                let one_is_wide = is_wide(one) || is_wide(other);
+                if whole.norm() <= LONGEST_JOINED_M && one_is_wide && target[*b] == *b {
+                    target[*b] = target[*a];
                     joined = true;
                 }
             }
         }
-        for (free, target) in target.iter_mut().enumerate() {
-            if self.groups[free].claimed_by.is_none()
-                && let Some(owner) = self.missing_part(tracks, free)
-            {
-                (*target, joined) = (owner, true);
+        for (number, bounds) in &free {
+            if let Some(owner) = self.missing_part(tracks, *number, bounds) {
+                target[*number] = owner;
+                joined = true;
             }
         }
-        (self.boxes, self.target) = (boxes, target);
+        (self.free, self.target) = (free, target);
         if joined {
             self.gather_joined(tracks, scene);
         }
@@ -256,14 +256,18 @@ impl Grouping {
 
     /// The group of a vehicle whose bumper or rear a free group can be: a bonnet that rises
     /// towards the screen leaves a gap between two layers.
-    fn missing_part(&self, tracks: &[Track], free: usize) -> Option<usize> {
+    fn missing_part(
+        &self,
+        tracks: &[Track],
+        free: usize,
+        [low_m, high_m]: &[Vector2<f64>; 2],
+    ) -> Option<usize> {
         /// Between a bumper and the foot of a screen.
         const BONNET_M: f64 = 1.6;
         /// Narrower ones are people.
         const NARROWEST_M: f64 = 0.9;
         let group = &self.groups[free];
-        let [low, high] = self.bounds(group);
-        if (high - low).norm() < NARROWEST_M {
+        if (high_m - low_m).norm() < NARROWEST_M {
             return None;
         }
         self.groups.iter().position(|other| {

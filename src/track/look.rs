@@ -202,7 +202,7 @@ fn upper_m(spots: &[Spot]) -> Option<f64> {
 /// grass are not.
 fn roughness_m(spots: &[Spot], scan: &Scan) -> f64 {
     /// More say nothing new.
-    const MOST: usize = 128;
+    const MOST: usize = 64;
     /// A jump between two surfaces says nothing of either.
     const EDGE_M: f32 = 0.6;
     let mut jumps = [0.0f32; MOST];

@@ -38,6 +38,9 @@ pub(super) struct ObjectTracker {
 
 /// Returns of a single low layer that show a vehicle.
 const BUMPER_RETURNS: usize = 15;
+/// Share of its columns in which a new object may go on above: more do so in walls, hedges and
+/// trunks, of which there are many tracks otherwise that nobody needs.
+const MOST_GOES_ON: f64 = 0.65;
 /// Cost beyond which a group is not a track: chi-squared of two degrees of freedom at 0.9997,
 /// and the prices for size and spread.
 const GATE: f64 = 16.0;
@@ -98,7 +101,7 @@ impl ObjectTracker {
         self.pair(origin_m, parameters);
         self.update(scene, end);
         self.begin(scene, end, origin_m, parameters);
-        self.tidy(end, origin_m, parameters);
+        self.tidy(end, parameters);
         self.publish(end, parameters);
     }
 
@@ -119,7 +122,12 @@ impl ObjectTracker {
     fn take_places(&mut self, origin_m: Vector2<f64>, more_m: impl Fn(&Track) -> f64) {
         self.places.clear();
         self.reaches.begin(origin_m);
-        for track in &self.tracks {
+        self.add_places(more_m);
+    }
+
+    /// The same for the tracks that were added since then.
+    fn add_places(&mut self, more_m: impl Fn(&Track) -> f64) {
+        for track in &self.tracks[self.places.len()..] {
             let place = track.rectangle();
             let reach_m = place.radius_m() + more_m(track);
             self.reaches.push(place.centre_m.into(), reach_m);
@@ -191,7 +199,7 @@ impl ObjectTracker {
     ) {
         self.take_places(origin_m, |_| 0.0);
         for (number, group) in self.grouping.groups().iter().enumerate() {
-            if group.claimed_by.is_some() || self.assigner.pairs().contains(&Some(number)) {
+            if group.claimed_by.is_some() || self.assigner.is_paired(number) {
                 continue;
             }
             let middle_m = group.look.middle_m;
@@ -204,7 +212,7 @@ impl ObjectTracker {
             let may_be_bumper = spots.len() >= BUMPER_RETURNS
                 && group.look.top_below_m > parameters.lowest_object_m;
             let is_low = group.look.top_m < parameters.lowest_object_m && !may_be_bumper;
-            if is_piece || is_low {
+            if is_piece || is_low || group.look.goes_on > MOST_GOES_ON {
                 continue;
             }
             let floor_z_m = floor_z_m(spots, scene);
@@ -223,21 +231,28 @@ impl ObjectTracker {
         }
     }
 
-    /// Drops what is gone, and the younger of two that stand in one place.
-    fn tidy(&mut self, end: Time, origin_m: Vector2<f64>, parameters: &TrackParameters) {
-        self.lost.retain(|track| track.may_return(end));
-        let gone = self
-            .tracks
-            .extract_if(.., |track| track.is_gone(parameters));
-        self.lost.extend(gone.filter(|track| track.may_return(end)));
-        self.take_places(origin_m, |_| 0.0);
+    /// Drops what is gone, and the worse of two that stand in one place; the places of all but the
+    /// new ones are known.
+    fn tidy(&mut self, end: Time, parameters: &TrackParameters) {
+        /// Of what is gone: nothing is worse.
+        const GONE: f64 = f64::NEG_INFINITY;
+        self.add_places(|_| 0.0);
         self.odds.clear();
-        self.odds.extend(self.tracks.iter().map(Track::odds));
+        self.odds.extend(self.tracks.iter().map(|track| {
+            if track.is_gone(parameters) {
+                GONE
+            } else {
+                track.odds()
+            }
+        }));
         let (places, odds, reaches) = (&self.places, &self.odds, &mut self.reaches);
         let mut number = 0;
-        let doubled = self.tracks.extract_if(.., |_| {
+        let dropped = self.tracks.extract_if(.., |_| {
             let own = number;
             number += 1;
+            if odds[own] == GONE {
+                return true;
+            }
             let centre_m = places[own].0.centre_m;
             reaches.near(centre_m.into()).any(|other| {
                 let is_better = (odds[other], Reverse(other)) > (odds[own], Reverse(own));
@@ -246,8 +261,9 @@ impl ObjectTracker {
                 is_better && outline.distance_m(centre_m) < -depth_m
             })
         });
+        self.lost.retain(|track| track.may_return(end));
         self.lost
-            .extend(doubled.filter(|track| track.may_return(end)));
+            .extend(dropped.filter(|track| track.may_return(end)));
     }
 
     fn publish(&mut self, end: Time, parameters: &TrackParameters) {
@@ -306,4 +322,34 @@ fn floor_z_m(spots: &[Spot], scene: &Scene<'_>) -> f64 {
         f64::from(scene.scan.z_m()[spot.point as usize] - spot.above_m)
     });
     scene.sweep.sensor.position_m[2] + z_m
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::tests::scan_of;
+    use crate::cluster::{ClusterParameters, Dbscan};
+    use crate::parameter::Profile;
+    use crate::track::tests::with_scene;
+
+    #[test]
+    fn what_goes_on_above_in_most_of_its_columns_begins_no_track() {
+        // A body of four layers and ten columns; what is above it is no part of it.
+        let tracks = |going_on: usize| {
+            let scan = scan_of(1800, |column, layer| match column {
+                100..110 if (5..9).contains(&layer) => 1000,
+                100.. if column < 100 + going_on && layer == 9 => 1000,
+                _ => 0,
+            });
+            let left_out: Vec<bool> = (0..scan.len()).map(|point| scan.layer(point) > 8).collect();
+            with_scene(&scan, |scene| {
+                let mut dbscan = Dbscan::new(&ClusterParameters::profile(Profile::Default));
+                let clusters = dbscan.process(&scan, &left_out, scene.heights_m);
+                let mut tracker = ObjectTracker::default();
+                tracker.process(clusters, scene, &TrackParameters::profile(Profile::Default));
+                tracker.tracks.len()
+            })
+        };
+        assert_eq!((tracks(5), tracks(8)), (1, 0));
+    }
 }

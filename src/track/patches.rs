@@ -117,7 +117,7 @@ impl Placer {
         self.origin_m = origin_m;
         self.placed.clear();
         self.patches.clear();
-        self.cluster.begin(scene.placements, origin_m);
+        self.cluster.begin(scene, origin_m);
         for points in clusters.iter() {
             self.cluster.place(points, scene);
             let mut bounds = self.cluster.bounds();

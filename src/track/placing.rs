@@ -2,7 +2,7 @@
 
 use super::Scene;
 use super::look::same_above;
-use crate::ego::Placement;
+use crate::cloud::MAX_LAYERS;
 use crate::float::{bounds_of, greatest, least};
 
 /// Returns of a cluster in the order of the scan, each with the sensor's pose at the time of its
@@ -17,16 +17,18 @@ pub(super) struct Placing {
     above_m: Vec<f32>,
     range_m: Vec<f32>,
     point: Vec<u32>,
-    /// How each column is placed.
-    columns: Vec<Turn>,
+    /// Where each column looks.
+    columns: Vec<Bearing>,
+    /// Cosine of each layer's elevation.
+    cosines: [f32; MAX_LAYERS],
 }
 
-/// A turn, and a shift from where the sensor is at the end, in the plane.
+/// Whence and whither a column looks, along the axes of the local frame.
 #[derive(Debug, Clone, Copy)]
-struct Turn {
+struct Bearing {
+    /// Relative to where the sensor is at the end.
     origin_m: [f32; 2],
-    sine: f32,
-    cosine: f32,
+    direction: [f32; 2],
 }
 
 /// One return of a cluster.
@@ -73,16 +75,19 @@ impl Bounds {
 }
 
 impl Placing {
-    /// Takes over where the sensor was at each column, relative to where it is at the end.
-    pub(super) fn begin(&mut self, placements: &[Placement], origin_m: [f64; 2]) {
+    /// Takes over where the sensor was at each column, relative to where it is at the end, and
+    /// where it looked.
+    pub(super) fn begin(&mut self, scene: &Scene<'_>, origin_m: [f64; 2]) {
+        let scan = scene.scan;
+        self.cosines = std::array::from_fn(|layer| scan.slope(layer).1 as f32);
         self.columns.clear();
-        self.columns.extend(placements.iter().map(|placement| {
-            let (sine, cosine) = placement.turn();
+        let placements = scene.placements.iter().enumerate();
+        self.columns.extend(placements.map(|(column, placement)| {
             let own_m = placement.origin_m();
-            Turn {
+            let direction = placement.turned(scan.direction(column).map(f64::from));
+            Bearing {
                 origin_m: [0, 1].map(|axis| (own_m[axis] - origin_m[axis]) as f32),
-                sine: sine as f32,
-                cosine: cosine as f32,
+                direction: direction.map(|share| share as f32),
             }
         }));
     }
@@ -102,18 +107,18 @@ impl Placing {
         self.point.clear();
         self.point.extend_from_slice(points);
         let scan = scene.scan;
-        let (x_m, y_m) = (scan.x_m(), &scan.y_m()[..scan.len()]);
         let (range_m, heights_m) = (scan.range_m(), &scene.heights_m[..scan.len()]);
         let places = self.x_m.iter_mut().zip(&mut self.y_m);
         let others = self.above_m.iter_mut().zip(&mut self.range_m);
         for ((point, place), other) in points.iter().zip(places).zip(others) {
             let number = *point as usize;
-            let (x, y) = (x_m[number], y_m[number]);
-            let turn = &self.columns[scan.column(number)];
-            *place.0 = turn.origin_m[0] + x * turn.cosine - y * turn.sine;
-            *place.1 = turn.origin_m[1] + x * turn.sine + y * turn.cosine;
+            let range_m = range_m[number];
+            let distance_m = range_m * self.cosines[scan.layer(number)];
+            let bearing = &self.columns[scan.column(number)];
+            *place.0 = bearing.origin_m[0] + distance_m * bearing.direction[0];
+            *place.1 = bearing.origin_m[1] + distance_m * bearing.direction[1];
             *other.0 = heights_m[number];
-            *other.1 = range_m[number];
+            *other.1 = range_m;
         }
     }
 

@@ -26,7 +26,7 @@ const DIRECTIONS: usize = 2 * TOGETHER;
 /// Those that are tried together.
 const TOGETHER: usize = 16;
 /// Points that are looked at for the direction: more do not change it.
-const MOST_POINTS: usize = 96;
+const MOST_POINTS: usize = 64;
 /// Distance to an edge below which a point counts as on it.
 const NEAREST_M: f32 = 0.05;
 

@@ -26,7 +26,7 @@ const MARGIN_M: f64 = 0.4;
 /// A ray that nothing came back from has most likely passed.
 const NO_RETURN: f64 = 0.7;
 /// Columns that are looked at: more say nothing new.
-const MOST_COLUMNS: usize = 40;
+const MOST_COLUMNS: usize = 20;
 
 impl Sight {
     /// Looks at where a box of some height stands, in a sensor frame `sensor_height_m` above
