@@ -115,16 +115,17 @@ fn assert_is_dbscan(scan: &Scan, ground: &[bool], parameters: &ClusterParameters
     let clusters = Dbscan::new(parameters)
         .process(scan, ground, &heights_m)
         .clone();
+    let labels = clusters.labels();
     let is_too_high = |height_m: &f32| f64::from(*height_m) > parameters.highest_m;
     let heights = heights_m.iter().map(is_too_high);
     let left_out: Vec<bool> = ground.iter().zip(heights).map(|(a, b)| *a || b).collect();
     for (point, _) in left_out.iter().enumerate().filter(|(_, is_out)| **is_out) {
-        assert_eq!(clusters.labels()[point], Clusters::NONE);
+        assert_eq!(labels[point], Clusters::NONE);
     }
     let truth = BruteForce::new(scan, &left_out, parameters);
     let mut component_of_cluster = vec![usize::MAX; clusters.len()];
     for point in truth.points.iter().copied() {
-        let label = clusters.labels()[point];
+        let label = labels[point];
         if truth.core[point] {
             assert_ne!(label, Clusters::NONE, "core point {point} is noise");
             let component = &mut component_of_cluster[usize::from(label)];
@@ -140,7 +141,7 @@ fn assert_is_dbscan(scan: &Scan, ground: &[bool], parameters: &ClusterParameters
             let distance = |other| squared_distance(scan, point, other);
             distance(*a).total_cmp(&distance(*b)).then(a.cmp(b))
         });
-        let expected = nearest.map_or(Clusters::NONE, |core| clusters.labels()[core]);
+        let expected = nearest.map_or(Clusters::NONE, |core| labels[core]);
         assert_eq!(label, expected, "border point {point}");
     }
     component_of_cluster.sort_unstable();

@@ -28,7 +28,8 @@ impl LabelWriter {
 
     /// Adds the labels of the pipeline's last revolution.
     pub(super) fn put_perceived(&mut self, pipeline: &Pipeline, revolution: u32) -> Result<()> {
-        let labels = (0..pipeline.scan().len()).map(|point| label(pipeline, point));
+        let clusters = pipeline.clusters().labels().into_iter().enumerate();
+        let labels = clusters.map(|(point, cluster)| label(pipeline, point, cluster));
         self.put(labels, revolution)
     }
 
@@ -48,13 +49,13 @@ impl LabelWriter {
     }
 }
 
-fn label(pipeline: &Pipeline, point: usize) -> i32 {
+fn label(pipeline: &Pipeline, point: usize, cluster: u16) -> i32 {
     if !pipeline.scan().has_return(point) {
         NO_RETURN
     } else if pipeline.ground_mask()[point] {
         GROUND
     } else {
-        match pipeline.clusters().labels()[point] {
+        match cluster {
             Clusters::NONE => NOISE,
             cluster => FIRST_CLUSTER + i32::from(cluster),
         }

@@ -124,7 +124,7 @@ impl Dbscan {
     /// Sorts points into their clusters by counting.
     fn collect_points(&mut self, len: usize) {
         let Clusters {
-            labels,
+            members,
             points,
             ends,
         } = &mut self.clusters;
@@ -134,13 +134,11 @@ impl Dbscan {
             total += std::mem::replace(end, total);
         }
         points.resize(total, 0);
-        labels.clear();
-        labels.resize(len, Clusters::NONE);
+        members.clear();
+        members.extend_from_slice(&self.density.is_core[..len]);
         let runs = self.joiner.runs.numbers(len);
-        for point in marked(&self.density.is_core[..len]) {
-            let label = self.numbers[usize::from(runs[point])];
-            labels[point] = label;
-            let end = &mut ends[usize::from(label)];
+        for point in marked(members) {
+            let end = &mut ends[usize::from(self.numbers[usize::from(runs[point])])];
             points[*end] = point as u32;
             *end += 1;
         }

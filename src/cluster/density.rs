@@ -6,9 +6,9 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use super::ClusterParameters;
+use super::raster::{Given, Raster};
 use super::returns::Returns;
 use crate::cloud::{CAPACITY, MAX_LAYERS, Scan};
-use crate::float::least;
 
 /// What is known of every point when its neighbours close by were counted. Its buffers are made
 /// once.
@@ -16,14 +16,18 @@ use crate::float::least;
 pub(super) struct Density {
     /// Square of the distance within which others are neighbours; negative if it is not looked at.
     eps_squared: Box<[f32; CAPACITY]>,
-    /// Neighbours that were counted so far, of the points of a chunk and the next one.
-    close: Box<[f32; 2 * CHUNK]>,
+    /// The points of a chunk and the next one.
+    raster: Raster<{ 2 * CHUNK }>,
+    /// Neighbours of these that were counted so far.
+    close: Box<[u16; 2 * CHUNK]>,
     /// Which of many pairs are neighbours, while they are counted.
-    near: Box<[f32; CHUNK]>,
-    /// Whether it is a neighbour of the point in its layer, in the column before.
+    near: Box<[u16; CHUNK]>,
+    /// Whether it is for sure a neighbour of the point in its layer, in the column before.
     pub(super) follows: Box<[bool; CAPACITY]>,
-    /// Whether it is a neighbour of the next point of the array, which is the one above it.
+    /// Whether it is for sure a neighbour of the next point of the array, the one above it.
     pub(super) meets: Box<[bool; CAPACITY]>,
+    /// Whether it is looked at.
+    is_taken: Box<[bool; CHUNK]>,
     /// Whether it is a core point; at the end, whether it is of a cluster at all.
     pub(super) is_core: Box<[bool; CAPACITY]>,
     /// Whether the neighbours that were counted do not suffice to call it one.
@@ -58,10 +62,12 @@ impl Density {
         let never = || Box::new([false; CAPACITY]);
         Self {
             eps_squared: Box::new([NOT_TAKEN; CAPACITY]),
-            close: Box::new([0.0; 2 * CHUNK]),
-            near: Box::new([0.0; CHUNK]),
+            raster: Raster::new(),
+            close: Box::new([0; 2 * CHUNK]),
+            near: Box::new([0; CHUNK]),
             follows: never(),
             meets: never(),
+            is_taken: Box::new([false; CHUNK]),
             is_core: never(),
             is_open: never(),
         }
@@ -93,52 +99,66 @@ impl Density {
     ) {
         let len = scan.len();
         let chunk = |begin: usize| begin.min(len)..(begin + CHUNK).min(len);
-        self.take(scan, (ground, heights_m), chunk(0), parameters);
-        self.close.fill(1.0);
+        // Where nothing is counted: at the begin and the end, or everywhere.
+        let counted = if few > 0 { len } else { 0 };
+        self.follows[..counted.min(FOLLOWING)].fill(false);
+        self.follows[counted..len].fill(false);
+        self.meets[len.saturating_sub(ABOVE)..len].fill(false);
+        self.take(scan, (ground, heights_m), (chunk(0), 0), parameters);
+        self.close.fill(1);
         for begin in (0..len).step_by(CHUNK) {
-            self.take(scan, (ground, heights_m), chunk(begin + CHUNK), parameters);
+            let next = (chunk(begin + CHUNK), CHUNK);
+            self.take(scan, (ground, heights_m), next, parameters);
             let pairs = PAIRS.iter().filter(|(columns, _)| *columns <= few);
             for (_, apart) in pairs {
-                self.count_pairs(scan, chunk(begin), *apart);
+                self.count_pairs(len, chunk(begin), *apart);
             }
             // No later pair has a point of this chunk.
             self.judge(scan, chunk(begin), parameters);
+            self.raster.advance();
             self.close.copy_within(CHUNK.., 0);
-            self.close[CHUNK..].fill(1.0);
+            self.close[CHUNK..].fill(1);
         }
     }
 
-    /// Takes the points of a chunk over.
+    /// Takes the points of a chunk over, and puts them in a place of the raster.
     fn take(
         &mut self,
         scan: &Scan,
         (ground, heights_m): (&[bool], &[f32]),
-        chunk: Range<usize>,
+        (chunk, place): (Range<usize>, usize),
         parameters: &ClusterParameters,
     ) {
+        let range_m = &scan.range_m()[chunk.clone()];
+        let is_taken = &mut self.is_taken[..chunk.len()];
         take(
-            &scan.range_m()[chunk.clone()],
+            range_m,
             (&ground[chunk.clone()], &heights_m[chunk.clone()]),
             parameters,
-            &mut self.eps_squared[chunk.clone()],
+            (&mut self.eps_squared[chunk.clone()], is_taken),
         );
-        self.follows[chunk.clone()].fill(false);
-        self.meets[chunk].fill(false);
+        let given = Given {
+            at_m: [scan.x_m(), scan.y_m(), scan.z_m()].map(|metres| &metres[chunk.clone()]),
+            range_m,
+            is_taken,
+        };
+        self.raster
+            .put(place..place + chunk.len(), given, parameters);
     }
 
     /// Counts the pairs of points so far apart of which the first is in a chunk.
-    fn count_pairs(&mut self, scan: &Scan, chunk: Range<usize>, apart: usize) {
-        let returns = Returns::of(scan, &self.eps_squared[..]);
-        let end = chunk.end.min(scan.len().saturating_sub(apart));
-        let pairs = chunk.start.min(end)..end;
-        let near = &mut self.near[..pairs.len()];
-        count_pairs(&returns, pairs.clone(), apart, near, &mut self.close[..]);
+    fn count_pairs(&mut self, len: usize, chunk: Range<usize>, apart: usize) {
+        let end = chunk.end.min(len.saturating_sub(apart));
+        let near = &mut self.near[..end.saturating_sub(chunk.start)];
+        self.raster.compare(apart, near);
+        add(near, &mut self.close[..]);
+        add(near, &mut self.close[apart..]);
         let (flags, first) = match apart {
-            FOLLOWING => (&mut self.follows, pairs.start + apart),
-            ABOVE => (&mut self.meets, pairs.start),
+            FOLLOWING => (&mut self.follows, chunk.start + apart),
+            ABOVE => (&mut self.meets, chunk.start),
             _ => return,
         };
-        flag(near, &mut flags[first..]);
+        flag(near, &mut flags[first.min(len)..]);
     }
 
     /// Says which points of a chunk are core points for the neighbours that were counted, and
@@ -166,66 +186,42 @@ fn take(
     range_m: &[f32],
     (ground, heights_m): (&[bool], &[f32]),
     parameters: &ClusterParameters,
-    eps_squared: &mut [f32],
+    (eps_squared, is_taken): (&mut [f32], &mut [bool]),
 ) {
     let (count, highest_m) = (range_m.len(), parameters.highest_m as f32);
     let (ground, heights_m) = (&ground[..count], &heights_m[..count]);
-    let eps_squared = &mut eps_squared[..count];
+    let (eps_squared, is_taken) = (&mut eps_squared[..count], &mut is_taken[..count]);
     for point in 0..count {
-        let is_taken = (range_m[point] > 0.0) & !ground[point] & (heights_m[point] <= highest_m);
+        is_taken[point] = (range_m[point] > 0.0) & !ground[point] & (heights_m[point] <= highest_m);
         let eps_m = parameters.eps_m(range_m[point]);
-        eps_squared[point] = if is_taken { eps_m * eps_m } else { NOT_TAKEN };
+        eps_squared[point] = if is_taken[point] {
+            eps_m * eps_m
+        } else {
+            NOT_TAKEN
+        };
     }
 }
 
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-fn count_pairs(
-    returns: &Returns<'_>,
-    pairs: Range<usize>,
-    apart: usize,
-    near: &mut [f32],
-    close: &mut [f32],
-) {
-    let Returns {
-        x_m,
-        y_m,
-        z_m,
-        eps_squared,
-        ..
-    } = returns;
-    let (first, count) = (pairs.start, near.len());
-    let (x, x2) = (&x_m[first..][..count], &x_m[first + apart..][..count]);
-    let (y, y2) = (&y_m[first..][..count], &y_m[first + apart..][..count]);
-    let (z, z2) = (&z_m[first..][..count], &z_m[first + apart..][..count]);
-    let eps = &eps_squared[first..][..count];
-    let eps2 = &eps_squared[first + apart..][..count];
-    for pair in 0..count {
-        let (dx, dy, dz) = (x2[pair] - x[pair], y2[pair] - y[pair], z2[pair] - z[pair]);
-        let is_near = dx * dx + dy * dy + dz * dz <= least(eps[pair], eps2[pair]);
-        near[pair] = if is_near { 1.0 } else { 0.0 };
-    }
-    let before = &mut close[..count];
-    for pair in 0..count {
-        before[pair] += near[pair];
-    }
-    let behind = &mut close[apart..][..count];
-    for pair in 0..count {
-        behind[pair] += near[pair];
+fn add(near: &[u16], close: &mut [u16]) {
+    let close = &mut close[..near.len()];
+    for pair in 0..near.len() {
+        close[pair] += near[pair];
     }
 }
 
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-fn flag(near: &[f32], flags: &mut [bool]) {
+fn flag(near: &[u16], flags: &mut [bool]) {
     let flags = &mut flags[..near.len()];
     for pair in 0..near.len() {
-        flags[pair] = near[pair] > 0.0;
+        flags[pair] = near[pair] > 0;
     }
 }
 
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn judge(
     range_m: &[f32],
-    (eps_squared, close): (&[f32], &[f32]),
+    (eps_squared, close): (&[f32], &[u16]),
     parameters: &ClusterParameters,
     (is_core, is_open): (&mut [bool], &mut [bool]),
 ) {
@@ -234,7 +230,7 @@ fn judge(
     let (is_core, is_open) = (&mut is_core[..count], &mut is_open[..count]);
     for point in 0..count {
         let is_taken = eps_squared[point] >= 0.0;
-        let suffices = close[point] > parameters.more_than(range_m[point]);
+        let suffices = f32::from(close[point]) > parameters.more_than(range_m[point]);
         is_core[point] = is_taken & suffices;
         is_open[point] = is_taken & !suffices;
     }
@@ -271,7 +267,7 @@ mod tests {
         let mut parameters = ClusterParameters::profile(Profile::Default);
         parameters.eps_per_m = 0.0;
         // One column along the wall is 0.07 m, and a layer 0.035 m.
-        parameters.eps_m = 0.1;
+        parameters.eps_m = 0.12;
         let mut density = Density::new();
         for few in [columns, 2] {
             density.count(&scan, (&ground, &vec![0.0; scan.len()]), few, &parameters);

@@ -52,7 +52,7 @@ impl Joiner {
         for (number, run) in self.runs.all().iter().enumerate() {
             let column = run.columns().start;
             let first = run.point(column);
-            for apart in 2..=core.windows.clipped(GAP).min(column) {
+            for apart in 1..=core.windows.clipped(GAP).min(column) {
                 let before = first - apart * MAX_LAYERS;
                 let other = numbers[before];
                 if other != Runs::NONE && core.returns.are_neighbours(before, first) {

@@ -3,10 +3,11 @@
 //!
 //! DBSCAN (Ester et al. 1996) without a tree: the array is sorted by azimuth and elevation
 //! already, so that the neighbours of a point stand in a few columns of it. `density` counts those
-//! close by, which is enough for most points; `window` says in which columns and layers all others
-//! can be, and `returns` compares points there; `dbscan` is the algorithm, `joining` says which
-//! core points belong together: those that follow each other are `runs`, those that meet are `sets`
-//! of runs, and of sets only those whose `boxes` are near each other are looked at closer.
+//! close by on a `raster`, which is enough for most points; `window` says in which columns and
+//! layers all others can be, and `returns` compares points there; `dbscan` is the algorithm,
+//! `joining` says which core points belong together: those that follow each other are `runs`, those
+//! that meet are `sets` of runs, and of sets only those whose `boxes` are near each other are looked
+//! at closer.
 
 mod boxes;
 
@@ -15,6 +16,8 @@ mod dbscan;
 mod density;
 
 mod joining;
+
+mod raster;
 
 mod returns;
 
@@ -91,10 +94,10 @@ impl ClusterParameters {
     }
 }
 
-/// Clusters of one revolution: labels on the array, and the points of each, in array order.
+/// Clusters of one revolution: which points are of any, and those of each, in array order.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Clusters {
-    labels: Vec<u16>,
+    members: Vec<bool>,
     points: Vec<u32>,
     ends: Vec<usize>,
 }
@@ -113,9 +116,20 @@ impl Clusters {
         self.ends.is_empty()
     }
 
+    /// Of every point of the scan whether it is of a cluster.
+    pub fn members(&self) -> &[bool] {
+        &self.members
+    }
+
     /// The cluster of every point of the scan, or [`Clusters::NONE`].
-    pub fn labels(&self) -> &[u16] {
-        &self.labels
+    pub fn labels(&self) -> Vec<u16> {
+        let mut labels = vec![Self::NONE; self.members.len()];
+        for (points, label) in self.iter().zip(0..) {
+            for point in points {
+                labels[*point as usize] = label;
+            }
+        }
+        labels
     }
 
     /// The points of a cluster in array order.

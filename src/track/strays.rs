@@ -76,7 +76,7 @@ impl Strays {
         self.marks.clear();
         self.marks.resize(points.len(), false);
         mark_strays(
-            &clusters.labels()[points.clone()],
+            &clusters.members()[points.clone()],
             &scene.scan.range_m()[points.clone()],
             &scene.heights_m[points],
             heights_m,
@@ -87,17 +87,17 @@ impl Strays {
 
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn mark_strays(
-    labels: &[u16],
+    is_member: &[bool],
     ranges_m: &[f32],
     heights_m: &[f32],
     [low_m, high_m]: [f32; 2],
     marks: &mut [bool],
 ) {
     let count = marks.len();
-    let (labels, ranges_m) = (&labels[..count], &ranges_m[..count]);
+    let (is_member, ranges_m) = (&is_member[..count], &ranges_m[..count]);
     let heights_m = &heights_m[..count];
     for point in 0..count {
-        marks[point] = (labels[point] == Clusters::NONE)
+        marks[point] = !is_member[point]
             & (ranges_m[point] > 0.0)
             & (heights_m[point] >= low_m)
             & (heights_m[point] < high_m);
