@@ -83,12 +83,20 @@ impl<'a> Returns<'a> {
     /// Whether two points are neighbours.
     #[inline(always)]
     pub(super) fn are_neighbours(&self, a: usize, b: usize) -> bool {
+        /// Rounding must not part two points that are as far from each other as neighbours can be.
+        const SLACK: f32 = 1.01;
+        let most = least(self.eps_squared[a], self.eps_squared[b]);
+        // No two points are nearer to each other than their ranges are.
+        let deeper_m = self.range_m[a] - self.range_m[b];
+        if deeper_m * deeper_m > SLACK * most {
+            return false;
+        }
         let (dx, dy, dz) = (
             self.x_m[a] - self.x_m[b],
             self.y_m[a] - self.y_m[b],
             self.z_m[a] - self.z_m[b],
         );
-        dx * dx + dy * dy + dz * dz <= least(self.eps_squared[a], self.eps_squared[b])
+        dx * dx + dy * dy + dz * dz <= most
     }
 
     /// How many points in a stretch of columns are neighbours of a point: all of these layers, and

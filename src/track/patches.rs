@@ -173,13 +173,13 @@ impl Placer {
             }
         }
         self.floor.join();
-        self.count_cells(is_too_tall);
+        self.count_cells(is_too_tall, whole.top_m);
         self.assign();
         self.sort(is_too_tall);
     }
 
     /// Counts the cells of every part, and those above which there is more, close to the cut.
-    fn count_cells(&mut self, is_too_tall: bool) {
+    fn count_cells(&mut self, is_too_tall: bool, top_m: f32) {
         let cells = self.floor.len();
         self.covered.clear();
         self.covered.resize(cells, false);
@@ -189,7 +189,7 @@ impl Placer {
             .above_m()
             .iter()
             .zip(ranges_m.zip(&self.places));
-        for (above_m, (range_m, place)) in own {
+        for (above_m, (range_m, place)) in own.filter(|_| top_m > CUT_M) {
             if *above_m > CUT_M
                 && *above_m < CUT_M + greatest(ABOVE_CUT_M, ABOVE_CUT_PER_M * range_m)
                 && let Some(cell) = self.floor.number(*place)
