@@ -60,12 +60,12 @@ parameters! {
         /// not all come from one place.
         segments: usize = 36, in 6..=360, "";
         /// Lowest returns of a slice that are kept.
-        lowest_per_segment: usize = 10, in 1..=64, "returns";
+        lowest_per_segment: usize = 6, thesis 10, in 1..=64, "returns";
         /// Horizontal range within which lowest returns are sought. Farther out a slope or a
         /// distant hollow is lower than the road around the vehicle.
         candidate_range_m: f64 = 25.0, thesis 130.0, in 5.0..=200.0, "m";
         /// Of so many columns one is looked at for lowest returns: neighbours meet the same road.
-        candidate_every: usize = 2, thesis 1, in 1..=16, "columns";
+        candidate_every: usize = 4, thesis 1, in 1..=16, "columns";
         /// Random draws of three returns.
         iterations: usize = 50, in 1..=1000, "";
         /// Distance to a candidate plane within which a lowest return supports it.
@@ -93,7 +93,7 @@ parameters! {
         /// How often the plane is fitted again to the returns near it, within the range of the
         /// candidates. The lowest returns lie below the road by their noise and in its hollows;
         /// all of them together lie on it.
-        refinements: usize = 3, thesis 0, in 0..=20, "";
+        refinements: usize = 2, thesis 0, in 0..=20, "";
         /// Height of the sensor that is taken when no plane was ever plausible.
         fallback_height_m: f64 = 1.9, thesis 2.05, in 0.1..=10.0, "m";
         /// Distance to the ground within which a return belongs to it.
