@@ -1,5 +1,6 @@
-//! Every step of the pipeline, and the whole from envelope bytes to envelope bytes: on a real
-//! drive (where the shared data is), on the simulated street with its poses, and on a worst case.
+//! Every step of the pipeline, and the whole from envelope bytes to envelope bytes: on a real drive
+//! and on what a parked car saw (where the shared data is), on the simulated street with its poses,
+//! and on a worst case.
 //! The steps are timed where they work, one after the other, with the caches as the others left
 //! them.
 //!
@@ -19,15 +20,11 @@ use kreisel::config::Configuration;
 use kreisel::wire::point_cloud::CompactPointCloud;
 use kreisel::wire::{Envelope, Recording};
 
-/// Three revolutions of a drive, again and again.
-fn real(rounds: usize) -> Option<Vec<Vec<u8>>> {
-    let path = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../shared/data/vlp16-sampleShort.rec"
-    );
-    let bytes = std::fs::read(path).ok()?;
-    // The first message of the recording is the incomplete one of a device that starts.
-    let entries = Recording::new(&bytes).skip(1);
+/// Revolutions of a real recording, again and again, but for so many at its begin.
+fn recorded(name: &str, skipped: usize, rounds: usize) -> Option<Vec<Vec<u8>>> {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data");
+    let bytes = std::fs::read(format!("{folder}/{name}.rec")).ok()?;
+    let entries = Recording::new(&bytes).skip(skipped);
     let frames: Vec<_> = entries.map(|entry| entry.unwrap().frame.to_vec()).collect();
     Some(
         (0..rounds)
@@ -35,6 +32,13 @@ fn real(rounds: usize) -> Option<Vec<Vec<u8>>> {
             .collect(),
     )
 }
+
+/// Real inputs: a drive of three revolutions, after the incomplete one of a device that starts, and
+/// 85 of a parked car.
+const RECORDED: [(&str, &str, usize); 2] = [
+    ("real", "vlp16-sampleShort", 1),
+    ("parked", "vlp16-parked-car-85rev", 0),
+];
 
 /// A revolution's frame with another time.
 fn at_time(frame: &[u8], round: usize) -> Vec<u8> {
@@ -102,10 +106,12 @@ fn main() {
     println!("one plain pass: {:.1} us", plain_pass());
     println!("| input | step | median us | p99 us | passes |");
     println!("|-|-|-:|-:|-:|");
-    if is_wanted("real") {
-        match real(rounds) {
-            Some(frames) => bench("real", &frames, &reaches_m),
-            None => eprintln!("skipped: no real recording beside the checkout"),
+    for (name, recording, skipped) in RECORDED {
+        if is_wanted(name) {
+            match recorded(recording, skipped, rounds) {
+                Some(frames) => bench(name, &frames, &reaches_m),
+                None => eprintln!("skipped: {name}, as {recording} is not beside the checkout"),
+            }
         }
     }
     if is_wanted("street") {
