@@ -3,9 +3,9 @@
 //! `slices` cuts the revolution like a pie, `minima` gathers the lowest returns of every slice,
 //! `ransac` finds the plane that most of them lie on, `plane` has the geometry, `moments` sums over
 //! points for it. `surface` follows the heights above and below that plane outward: `lowest` says
-//! where each layer meets it, neighbours have their `votes`, and a `profile` is what comes of it for
-//! each direction. `passes` is what is done with many points at once, and this file follows the
-//! plane from revolution to revolution and marks the points.
+//! where each layer meets it but for `vehicles`, neighbours have their `votes`, and a `profile` is
+//! what comes of it for each direction. `passes` is what is done with many points at once, and this
+//! file follows the plane from revolution to revolution and marks the points.
 
 mod lowest;
 mod minima;
@@ -16,6 +16,7 @@ mod profile;
 mod ransac;
 mod slices;
 mod surface;
+mod vehicles;
 mod votes;
 
 pub use plane::Plane;
@@ -29,6 +30,7 @@ use minima::Minima;
 use moments::{Positions, moments_near};
 use passes::Band;
 use surface::Surface;
+use vehicles::Vehicle;
 
 choices! {
     /// What the ground is thought to be.
@@ -150,6 +152,7 @@ pub struct Ground {
     distances_m: Vec<f32>,
     /// Ground that ends, towards the next layer.
     edges: Vec<bool>,
+    vehicles: Vec<Vehicle>,
 }
 
 /// Sectors in which the surface is followed, of 5 degrees each.
@@ -157,8 +160,6 @@ const SECTORS: usize = 72;
 /// Height from which on a return may be a foot, and what is added for each metre of distance.
 const FOOT_M: f32 = 0.02;
 const FOOT_PER_M: f32 = 0.0015;
-/// Height from which on a return in the place of a vehicle is its bumper or a tyre.
-const BUMPER_M: f32 = 0.07;
 /// Slope from there to the next return above that no road has.
 const STEEP: f32 = 1.0;
 
@@ -176,6 +177,7 @@ impl Ground {
             heights_m: Vec::with_capacity(CAPACITY),
             distances_m: Vec::with_capacity(CAPACITY),
             edges: Vec::with_capacity(CAPACITY),
+            vehicles: vec![],
         }
     }
 
@@ -273,8 +275,10 @@ impl Ground {
     fn mark_surface(&mut self, scan: &Scan, band: Band, vehicles: &[Rectangle]) {
         self.distances_m.resize(scan.len(), 0.0);
         passes::distances(scan, &mut self.distances_m);
+        self.vehicles.clear();
+        self.vehicles.extend(vehicles.iter().map(Vehicle::at));
         self.surface
-            .find(scan, &self.heights_m, &self.distances_m, vehicles);
+            .find(scan, &self.heights_m, &self.distances_m, &self.vehicles);
         self.edges.resize(scan.len(), false);
         for (columns, profile) in self.surface.stretches(scan) {
             let points = scan.index(columns.start, 0)..scan.index(columns.end, 0);
@@ -287,27 +291,8 @@ impl Ground {
             passes::mark_edges(mask, heights_m, distances_m, (FOOT_M, FOOT_PER_M), edges);
         }
         self.spare_feet(scan);
-        for vehicle in vehicles {
-            self.spare_vehicle(scan, vehicle);
-        }
-    }
-
-    /// Takes the mark off what is clearly above the ground where a vehicle is expected: far
-    /// away a single layer meets its bumper, as high as the ground may be unsure.
-    fn spare_vehicle(&mut self, scan: &Scan, vehicle: &Rectangle) {
-        let Some((first, count)) = scan.columns_across(&vehicle.corners()) else {
-            return;
-        };
-        let outline = vehicle.outline();
-        for column in (first..first + count).map(|column| scan.over_seam(column)) {
-            for layer in 0..MAX_LAYERS {
-                let point = scan.index(column, layer);
-                let [x, y, _] = scan.point_m(point).map(f64::from);
-                if self.mask[point] && self.heights_m[point] > BUMPER_M && outline.contains([x, y])
-                {
-                    self.mask[point] = false;
-                }
-            }
+        for vehicle in &self.vehicles {
+            vehicle.spare(scan, &self.heights_m, &mut self.mask);
         }
     }
 

@@ -8,17 +8,19 @@
 
 use std::ops::Range;
 
-use super::lowest::{Lowest, MOST_COLUMNS, NO_LEVEL_M, Points};
+use super::lowest::{Lowest, MOST_COLUMNS, Points};
 use super::profile::Profile;
 use super::slices::slices;
+use super::vehicles::Vehicle;
 use super::votes::{VOTERS, elected};
 use crate::cloud::{MAX_LAYERS, Scan};
-use crate::track::{Outline, Rectangle};
 
 /// Heights of the ground relative to the plane.
 #[derive(Debug, Clone)]
 pub(super) struct Surface {
     sectors: usize,
+    /// Sine of half the width of one.
+    slack: f64,
     /// Per sector: its rings from the inside out.
     rings: Vec<[Ring; MAX_LAYERS]>,
     voted: Vec<[Ring; MAX_LAYERS]>,
@@ -26,8 +28,6 @@ pub(super) struct Surface {
     /// The lowest returns of each layer in one sector.
     lowest: Lowest,
     candidates: Vec<(f32, f32)>,
-    /// Vehicles in the sector that is looked at.
-    vehicles: Vec<Outline>,
 }
 
 /// Where a layer meets the ground in a sector.
@@ -55,19 +55,17 @@ const FEWEST_SECTORS: usize = 6;
 /// How much farther off the ground of the next layer may be than that of the last.
 const SPREAD_M: f32 = 0.03;
 const SPREAD: f32 = 2.0;
-/// Around a vehicle that is known, for its way during the sweep.
-const AROUND_VEHICLES_M: f64 = 0.6;
 
 impl Surface {
     pub(super) fn new(sectors: usize) -> Self {
         Self {
             sectors,
+            slack: libm::sin(std::f64::consts::PI / sectors as f64),
             rings: vec![[Ring::default(); MAX_LAYERS]; sectors],
             voted: vec![[Ring::default(); MAX_LAYERS]; sectors],
             profiles: vec![Profile::FLAT; sectors],
             lowest: Lowest::new(),
             candidates: vec![],
-            vehicles: vec![],
         }
     }
 
@@ -77,7 +75,7 @@ impl Surface {
         scan: &Scan,
         heights_m: &[f32],
         distances_m: &[f32],
-        vehicles: &[Rectangle],
+        vehicles: &[Vehicle],
     ) {
         let points = Points {
             scan,
@@ -90,8 +88,7 @@ impl Surface {
         for (sector, stretch) in slices(scan, self.sectors) {
             for first in stretch.clone().step_by(MOST_COLUMNS) {
                 let columns = first..stretch.end.min(first + MOST_COLUMNS);
-                self.look_out(scan.azimuth_rad(first + columns.len() / 2), vehicles);
-                self.measure_sector(&points, columns, sector);
+                self.measure_sector(&points, columns, sector, vehicles);
             }
         }
         for rings in &mut self.rings {
@@ -130,31 +127,20 @@ impl Surface {
         }
     }
 
-    /// Notes the vehicles that a sector may meet.
-    fn look_out(&mut self, azimuth_rad: f64, vehicles: &[Rectangle]) {
-        let (sine, cosine) = libm::sincos(azimuth_rad);
-        let slack = libm::sin(std::f64::consts::PI / self.sectors as f64);
-        let may_meet = |vehicle: &&Rectangle| {
-            let [x, y] = vehicle.centre_m;
-            let reach_m = 0.5 * (vehicle.length_m + vehicle.width_m) + slack * libm::hypot(x, y);
-            x * sine + y * cosine > 0.0 && (x * cosine - y * sine).abs() < reach_m
-        };
-        self.vehicles.clear();
-        self.vehicles
-            .extend(vehicles.iter().filter(may_meet).map(Rectangle::outline));
-    }
-
     /// The low level of each layer in the columns of a sector.
-    fn measure_sector(&mut self, points: &Points<'_>, columns: Range<usize>, sector: usize) {
+    fn measure_sector(
+        &mut self,
+        points: &Points<'_>,
+        columns: Range<usize>,
+        sector: usize,
+        vehicles: &[Vehicle],
+    ) {
         let levels_m = self.lowest.note(points, columns.clone());
-        if !self.vehicles.is_empty() {
-            let first = points.scan.index(columns.start, 0);
-            let noted = levels_m.as_flattened_mut().iter_mut().enumerate();
-            for (place, level_m) in noted.filter(|(_, level_m)| **level_m < NO_LEVEL_M) {
-                if is_taken(&self.vehicles, points.scan, first + place) {
-                    *level_m = NO_LEVEL_M;
-                }
-            }
+        let middle = points.scan.direction(columns.start + columns.len() / 2);
+        let middle = middle.map(f64::from);
+        let may_reach = |vehicle: &&Vehicle| vehicle.may_reach_into(middle, self.slack);
+        for vehicle in vehicles.iter().filter(may_reach) {
+            vehicle.take_out(points.scan, columns.clone(), levels_m);
         }
         self.lowest.sort();
         for (layer, ring) in self.rings[sector].iter_mut().enumerate() {
@@ -188,15 +174,6 @@ impl Surface {
         let slices = slices(scan, self.sectors);
         slices.map(|(sector, columns)| (columns, &self.profiles[sector]))
     }
-}
-
-/// Whether a vehicle stands where a point is.
-fn is_taken(vehicles: &[Outline], scan: &Scan, point: usize) -> bool {
-    let [x, y, _] = scan.point_m(point).map(f64::from);
-    vehicles.iter().any(|vehicle| {
-        let distance_m = vehicle.distance_within_m([x, y], AROUND_VEHICLES_M);
-        distance_m.is_some_and(|distance_m| distance_m < AROUND_VEHICLES_M)
-    })
 }
 
 /// Keeps the rings that can be one ground, from the inside out, and forgets the others.

@@ -140,7 +140,7 @@ impl Outline {
 
     /// The same, by where the place is relative to the middle.
     #[inline(always)]
-    pub(super) fn off_edge_m(&self, offset_m: [f32; 2]) -> f32 {
+    pub(crate) fn off_edge_m(&self, offset_m: [f32; 2]) -> f32 {
         let [along_m, across_m] = turned(&offset_m, self.sine, self.cosine);
         let (along_m, across_m) = (
             along_m.abs() - self.half_m[0],
