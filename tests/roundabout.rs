@@ -135,3 +135,31 @@ fn the_thesis_profile_sees_the_same_road_users_and_changes_their_ids() {
     }
     assert!(changes > 0);
 }
+
+#[test]
+fn what_drives_around_the_island_keeps_its_id() {
+    let (mut changes, mut minutes) = (0, 0.0);
+    for seed in [13, 16, 24] {
+        let scenario = scenario::find("roundabout-waiting").unwrap();
+        let mut simulation = Simulation::new(scenario, seed);
+        let mut pipeline = Pipeline::new(&Configuration::profile(Profile::Default), 0);
+        let mut ids: BTreeMap<u32, u32> = BTreeMap::new();
+        for _ in 0..250 {
+            let mut frame = vec![];
+            let truth = simulation.revolve(&mut frame);
+            let (envelope, _) = Envelope::from_datagram(&frame).unwrap();
+            pipeline.handle(&envelope).unwrap();
+            for user in truth.objects.iter().filter(|user| user.points >= 5) {
+                minutes += 1.0 / 600.0;
+                let near = pipeline.objects().iter();
+                let near = near.map(|object| (distance_m(object, user), object.id));
+                let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0));
+                if let Some((_, id)) = nearest.filter(|(distance_m, _)| *distance_m < MATCH_M) {
+                    changes += u32::from(ids.insert(user.id, id).is_some_and(|was| was != id));
+                }
+            }
+        }
+    }
+    println!("{changes} changes of id in {minutes:.1} minutes of objects");
+    assert!(f64::from(changes) < 0.2 * minutes, "{changes}");
+}

@@ -40,9 +40,9 @@ impl Existence {
         self.sightings = self.sightings.saturating_add(1);
     }
 
-    /// Nothing was found of a track so old.
-    pub(super) fn miss(&mut self, sight: &Sight, age_s: f64) {
-        self.odds += if sight.is_hidden() {
+    /// Nothing was found of a track so old; `telling`, 0 to 1, is how much that says of it.
+    pub(super) fn miss(&mut self, sight: &Sight, age_s: f64, telling: f64) {
+        let change = if sight.is_hidden() {
             if age_s < YOUNG_S { MISSED } else { HIDDEN }
         } else if !sight.is_observable() {
             UNSEEN
@@ -51,6 +51,7 @@ impl Existence {
         } else {
             MISSED
         };
+        self.odds += telling * change;
     }
 
     pub(super) fn is_confirmed(&self) -> bool {
@@ -68,5 +69,27 @@ impl Existence {
 
     pub(super) fn probability(&self) -> f64 {
         1.0 / (1.0 + libm::exp(-self.odds))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_hardly_ever_met_is_not_gone_when_it_is_missed_some_times() {
+        let passed = Sight {
+            rays: 10.0,
+            blocked: 0.0,
+            passed: 10.0,
+        };
+        let after_misses = |telling: f64| {
+            let mut existence = Existence::new();
+            (0..10).for_each(|_| existence.see());
+            (0..5).for_each(|_| existence.miss(&passed, 5.0, telling));
+            existence
+        };
+        assert!(after_misses(1.0).is_gone());
+        assert!(!after_misses(0.3).is_gone());
     }
 }

@@ -22,10 +22,17 @@ pub(super) struct View {
     is_whole: [bool; 2],
     /// Only a cabin or a rider is seen: what is below reaches farther to both ends.
     is_upper: bool,
+    /// The sensor looks at a side, not at the front or the rear.
+    is_side_on: bool,
     sine: f64,
     cosine: f64,
     range_m: f64,
 }
+
+/// Cosine from which on a side is looked at rather than an end.
+const SIDE_ON: f64 = 0.7;
+/// Part of a length below which what is seen of a side may be any piece of it.
+const PIECE: f64 = 0.4;
 
 impl View {
     /// What is seen of a group in the axes of a yaw.
@@ -45,6 +52,7 @@ impl View {
             high_is_edge: [false; 2],
             is_whole: [false; 2],
             is_upper: false,
+            is_side_on: left[0].abs() > SIDE_ON,
             sine,
             cosine,
             range_m: look.range_m,
@@ -90,13 +98,14 @@ impl View {
         self.is_whole
     }
 
-    /// Where the middle of a box of this size is, given where it is expected, and how sure
-    /// that is, as a covariance in the local frame.
+    /// Where the middle of a box of this size is, given where it is expected and whether it moves,
+    /// and how sure that is, as a covariance in the local frame.
     pub(super) fn centre(
         &self,
         size_m: [f64; 2],
         size_deviation_m: [f64; 2],
         expected_m: Vector2<f64>,
+        is_moving: bool,
     ) -> (Vector2<f64>, Matrix2<f64>) {
         /// Standard deviation of an edge: noise of ranges and roundness of corners.
         const EDGE_M: f64 = 0.07;
@@ -124,8 +133,12 @@ impl View {
                 0.0
             };
             let edge_m = edge_m + inset_m;
+            // What drives out of sight is not seen up to its ends, whatever hides it.
+            let is_piece =
+                axis == 0 && is_moving && self.is_side_on && high - low < PIECE * size_m[axis];
+            let is_edge = [self.low_is_edge[axis], self.high_is_edge[axis]];
             (centre[axis], deviation[axis]) =
-                match (self.low_is_edge[axis], self.high_is_edge[axis]) {
+                match is_edge.map(|is_edge| is_edge && !is_piece).into() {
                     (true, true) if is_inset => {
                         let slack_m = half_m - 0.5 * (high - low);
                         (0.5 * (low + high), edge_m + UPPER * slack_m)
@@ -170,5 +183,44 @@ impl View {
             local(centre[0], centre[1]),
             turn * spread * turn.transpose(),
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::tests::scan_of;
+    use crate::track::tests::with_scene;
+
+    #[test]
+    fn a_short_piece_of_the_side_of_what_drives_may_be_any_part_of_it() {
+        // A metre of a car that stands across the line of sight, 33 m away.
+        let scan = scan_of(1800, |column, layer| match column {
+            5..14 if (6..8).contains(&layer) => 3300,
+            _ => 0,
+        });
+        let spots: Vec<Spot> = with_scene(&scan, |scene| {
+            let points = (0..scan.len()).filter(|point| scan.range_m()[*point] > 0.0);
+            points
+                .map(|point| {
+                    let [x, y, _] = scan.point_m(point);
+                    Spot::new(scene, point as u32, [x, y], 0)
+                })
+                .collect()
+        });
+        let look = Look::at(&spots, &scan, Vector2::zeros());
+        let view = View::of(&look, &spots, 0.0);
+        let centre_x_m = |expected_x_m: f64, is_moving: bool| {
+            let expected_m = Vector2::new(expected_x_m, 33.8);
+            let (centre_m, noise) = view.centre([4.3, 1.8], [0.1; 2], expected_m, is_moving);
+            (centre_m.x, libm::sqrt(noise[(0, 0)]))
+        };
+        for expected_x_m in [0.0, 2.0] {
+            let (x_m, deviation_m) = centre_x_m(expected_x_m, true);
+            assert!((x_m - expected_x_m).abs() < 1e-9 && deviation_m > 1.0);
+        }
+        let (x_m, deviation_m) = centre_x_m(0.0, false);
+        assert_eq!(x_m, centre_x_m(2.0, false).0);
+        assert!(deviation_m < 0.3);
     }
 }

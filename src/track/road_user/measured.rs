@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 
 use super::reunion::Parting;
-use super::{MOVING_MPS, Track};
+use super::{MOVING_MPS, Track, USUAL_GAIN};
 use crate::time::{Span, Time};
 use crate::track::class::{Belief, Qualities};
 use crate::track::look::Look;
@@ -42,6 +42,7 @@ impl Track {
         self.last_measured = seen_at;
         self.is_hidden = false;
         self.points = look.points;
+        self.usual_points += USUAL_GAIN * (look.points as f64 - self.usual_points);
         self.range_m = look.range_m;
         self.floor_z_m = floor_z_m;
         self.roughness_m += 0.2 * (look.roughness_m - self.roughness_m);
@@ -52,7 +53,9 @@ impl Track {
             *known_m += gain * (fresh_m - *known_m);
         }
         self.note_motion(look);
-        self.parted = Parting::of(&self.motion.estimate(), look.points);
+        if self.parted.is_renewed_by(look.points, seen_at) {
+            self.parted = Parting::of(&self.motion.estimate(), look.points, seen_at);
+        }
         self.belief.learn(&Belief::of(&self.qualities()), 0.3);
     }
 

@@ -32,6 +32,14 @@ const SPARSE: usize = 16;
 /// Speed from which an object counts as moving.
 const MOVING_MPS: f64 = 0.6;
 
+/// Usual returns from which on it is met for sure by rays through its place; between the few that
+/// meet what is thin and far away there are revolutions without any.
+const SURELY_MET: f64 = 8.0;
+/// Part of the doubt that is left for what is met least.
+const LEAST_TELLING: f64 = 0.3;
+/// Gain by which the usual returns follow.
+const USUAL_GAIN: f64 = 0.2;
+
 #[derive(Debug, Clone)]
 pub(super) struct Track {
     pub(super) id: u32,
@@ -57,10 +65,12 @@ pub(super) struct Track {
     trails: Trails,
     existence: Existence,
     points: usize,
+    /// Mean of the returns of late, where there were any.
+    usual_points: f64,
     range_m: f64,
     is_hidden: bool,
     floor_z_m: f64,
-    /// Where and how fast it was when it was last measured.
+    /// Where and how fast it was when it was last seen clearly.
     parted: Parting,
     /// Whether others know its id.
     pub(super) is_published: bool,
@@ -98,6 +108,7 @@ impl Track {
             trails: Trails::default(),
             existence: Existence::new(),
             points: look.points,
+            usual_points: look.points as f64,
             range_m: look.range_m,
             is_hidden: false,
             floor_z_m,
@@ -110,7 +121,7 @@ impl Track {
         track.trails.begin(centre_m);
         track.born_m = centre_m;
         track.motion = Motion::new(centre_m, noise, BIRTH_MPS);
-        track.parted = Parting::of(&track.motion.estimate(), look.points);
+        track.parted = Parting::of(&track.motion.estimate(), look.points, time);
         track
     }
 
@@ -206,6 +217,7 @@ impl Track {
             self.shape.size_m(vehicle),
             self.shape.size_deviation_m(vehicle),
             expected_m,
+            self.is_moving_vehicle(),
         );
         (centre_m, noise + Matrix2::identity() * MIDDLE_M * MIDDLE_M)
     }
@@ -245,7 +257,16 @@ impl Track {
             self.motion.halt();
         }
         let age_s = (end - self.first_seen).seconds();
-        self.existence.miss(sight, age_s);
+        self.existence.miss(sight, age_s, self.telling());
+    }
+
+    /// How much it says, 0 to 1, that nothing is found of it.
+    fn telling(&self) -> f64 {
+        if self.moves && self.belief.vehicle() < 0.5 {
+            (self.usual_points / SURELY_MET).clamp(LEAST_TELLING, 1.0)
+        } else {
+            1.0
+        }
     }
 
     /// Whether nothing is left of it.

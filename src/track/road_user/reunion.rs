@@ -14,7 +14,7 @@ const OFF_M: f64 = 0.8;
 const OFF_PER_LENGTH: f64 = 0.25;
 const OFF_PER_WAY: f64 = 0.15;
 /// How much it may have turned in a second, and the directions be wrong.
-const TURN_RADPS: f64 = 0.6;
+const TURN_RADPS: f64 = 0.8;
 const TURN_RAD: f64 = 0.4;
 /// Share by which its speed may have changed.
 const SPEED_SHARE: f64 = 0.4;
@@ -22,8 +22,13 @@ const SPEED_SHARE: f64 = 0.4;
 const GROWTH_M: f64 = 1.0;
 /// Standard deviation from which on nothing is known of a velocity.
 const UNKNOWN_MPS: f64 = 1.5;
+/// Share of the returns before below which a look says little of where something is: they may be
+/// of what is beside it...
+const CLEAR: f64 = 0.5;
+/// ...unless no more is seen of it for so long.
+const RENEWED_S: f64 = 1.0;
 
-/// Where and how fast a track was when it was last measured.
+/// Where and how fast a track was when it was last seen clearly.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Parting {
     position_m: Vector2<f64>,
@@ -32,17 +37,24 @@ pub(super) struct Parting {
     standing: f64,
     /// Returns on it.
     points: f64,
+    at: Time,
 }
 
 impl Parting {
-    pub(super) fn of(estimate: &Estimate, points: usize) -> Self {
+    pub(super) fn of(estimate: &Estimate, points: usize, at: Time) -> Self {
         Self {
             position_m: estimate.position_m,
             velocity_mps: estimate.velocity_mps,
             deviation_mps: libm::sqrt(0.5 * estimate.velocity_covariance.trace()),
             standing: estimate.standing,
             points: points as f64,
+            at,
         }
+    }
+
+    /// Whether a look with some returns at a time takes its place.
+    pub(super) fn is_renewed_by(&self, points: usize, at: Time) -> bool {
+        points as f64 >= CLEAR * self.points || (at - self.at).seconds() > RENEWED_S
     }
 
     pub(super) fn reframe(
@@ -59,19 +71,19 @@ impl Parting {
         self.standing < 0.5 && self.velocity_mps.norm() > MOVING_MPS
     }
 
-    /// How far from here the road user would be that parted `gap_s` ago, at the mean of its last
-    /// velocity and of this one; `None` if that is too far, or if the velocities do not go
-    /// together.
-    fn off_from_m(&self, parted: &Self, gap_s: f64, length_m: f64) -> Option<f64> {
+    /// How far from here the road user would be that parted before, on an arc from its last
+    /// velocity to this one; `None` if that is too far, or if the velocities do not go together.
+    fn off_from_m(&self, parted: &Self, length_m: f64) -> Option<f64> {
+        let gap_s = (self.at - parted.at).seconds();
         let is_known = self.deviation_mps < UNKNOWN_MPS;
         let velocity_mps = if is_known {
             self.velocity_mps
         } else {
             parted.velocity_mps
         };
+        let turn_rad = parted.velocity_mps.angle(&velocity_mps);
+        let speeds = [parted.velocity_mps, velocity_mps].map(|velocity| velocity.norm());
         if parted.moves() && is_known {
-            let turn_rad = parted.velocity_mps.angle(&velocity_mps);
-            let speeds = [parted.velocity_mps, velocity_mps].map(|velocity| velocity.norm());
             let changed_mps = libm::fabs(speeds[1] - speeds[0]);
             let is_other = turn_rad > TURN_RAD + TURN_RADPS * gap_s
                 || changed_mps > SPEED_SHARE * speeds[0].max(speeds[1]) + MOVING_MPS;
@@ -81,7 +93,10 @@ impl Parting {
         } else if parted.moves() != self.moves() {
             return None;
         }
-        let way_m = 0.5 * gap_s * (parted.velocity_mps + velocity_mps);
+        let half_rad = (0.5 * turn_rad).max(1e-6);
+        let chord_m = 0.5 * (speeds[0] + speeds[1]) * gap_s * libm::sin(half_rad) / half_rad;
+        let course = (parted.velocity_mps + velocity_mps).try_normalize(1e-6);
+        let way_m = course.map_or(Vector2::zeros(), |course| course * chord_m);
         let off_m = (self.position_m - parted.position_m - way_m).norm();
         let farthest_m = OFF_M + OFF_PER_LENGTH * length_m + OFF_PER_WAY * way_m.norm();
         (off_m < farthest_m).then_some(off_m)
@@ -97,11 +112,11 @@ impl Track {
     /// How far this new track is from where one that is not seen any more would be by now;
     /// `None` if it cannot be the same road user.
     pub(in crate::track) fn off_from_m(&self, lost: &Self) -> Option<f64> {
-        let gap_s = (self.last_measured - lost.last_measured).seconds();
+        let gap_s = (self.parted.at - lost.parted.at).seconds();
         let length_m = lost.shape.size_m(lost.belief.vehicle())[0];
         // A few returns may have been taken for the old one where this one was already seen.
         let is_apart =
-            lost.last_measured < self.first_seen || lost.parted.points < 0.5 * self.parted.points;
+            lost.parted.at < self.first_seen || lost.parted.points < 0.5 * self.parted.points;
         let is_in_time = gap_s > 0.0 && gap_s <= LONGEST_S;
         if !is_in_time || !is_apart || self.shape.seen_m[0] > length_m + GROWTH_M {
             return None;
@@ -111,12 +126,12 @@ impl Track {
         if !lost.parted.moves() && !is_alike {
             return None;
         }
-        self.parted.off_from_m(&lost.parted, gap_s, length_m)
+        self.parted.off_from_m(&lost.parted, length_m)
     }
 
-    /// Whether nothing is seen of it, though others know it.
+    /// Whether nothing or hardly anything is seen of it, though others know it.
     pub(in crate::track) fn is_missed(&self) -> bool {
-        self.is_published && self.points == 0
+        self.is_published && (self.points == 0 || self.parted.at < self.last_measured)
     }
 
     /// Goes on as a road user that was lost.
@@ -133,25 +148,90 @@ impl Track {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cloud::tests::scan_of;
+    use crate::time::Span;
+    use crate::track::look::Look;
+    use crate::track::spots::Spot;
+    use crate::track::tests::with_scene;
 
     const CYCLIST_M: f64 = 1.7;
 
     /// Seen at an angle of a circle of 16 m on which it drives at 4 m/s.
     fn at(angle_rad: f64) -> Parting {
+        on_circle(16.0, 4.0, angle_rad)
+    }
+
+    /// Seen at an angle of a circle on which it drives.
+    fn on_circle(radius_m: f64, speed_mps: f64, angle_rad: f64) -> Parting {
         let (sine, cosine) = angle_rad.sin_cos();
         Parting {
-            position_m: Vector2::new(16.0 * cosine, 16.0 * sine),
-            velocity_mps: Vector2::new(-4.0 * sine, 4.0 * cosine),
+            position_m: Vector2::new(cosine, sine) * radius_m,
+            velocity_mps: Vector2::new(-sine, cosine) * speed_mps,
             deviation_mps: 0.3,
             standing: 0.0,
             points: 9.0,
+            at: Time::ZERO + Span::from_seconds(angle_rad * radius_m / speed_mps),
+        }
+    }
+
+    fn later(parting: Parting, seconds: f64) -> Parting {
+        Parting {
+            at: parting.at + Span::from_seconds(seconds),
+            ..parting
         }
     }
 
     #[test]
     fn a_cyclist_who_turned_unseen_is_the_same() {
-        let off_m = at(0.6).off_from_m(&at(0.0), 2.4, CYCLIST_M);
+        let off_m = at(0.6).off_from_m(&at(0.0), CYCLIST_M);
         assert!(off_m.is_some_and(|off_m| off_m < 0.5), "{off_m:?}");
+    }
+
+    #[test]
+    fn a_car_that_drove_most_of_half_a_circle_unseen_is_the_same() {
+        let car = |angle_rad| on_circle(9.0, 8.0, angle_rad);
+        let off_m = car(2.2).off_from_m(&car(0.0), 4.3);
+        assert!(off_m.is_some_and(|off_m| off_m < 0.1), "{off_m:?}");
+    }
+
+    #[test]
+    fn a_glimpse_is_no_parting_unless_it_is_all_there_is() {
+        let parting = at(0.0);
+        let soon = parting.at + Span::from_seconds(0.1);
+        let late = parting.at + Span::from_seconds(1.5);
+        assert!(parting.is_renewed_by(5, soon));
+        assert!(!parting.is_renewed_by(4, soon));
+        assert!(parting.is_renewed_by(1, late));
+    }
+
+    #[test]
+    fn of_what_shows_a_few_returns_instead_of_many_hardly_anything_is_seen() {
+        let scan = scan_of(1800, |column, layer| match column {
+            0..40 if (5..8).contains(&layer) => 1500,
+            _ => 0,
+        });
+        let spots: Vec<Spot> = with_scene(&scan, |scene| {
+            let points = (0..scan.len()).filter(|point| scan.range_m()[*point] > 0.0);
+            points
+                .map(|point| {
+                    let [x, y, _] = scan.point_m(point);
+                    Spot::new(scene, point as u32, [x, y], 0)
+                })
+                .collect()
+        });
+        let look = |spots: &[Spot]| Look::at(spots, &scan, Vector2::zeros());
+        let (mut outline, begin) = (vec![], scan.time());
+        let mut track = Track::new(1, false, &spots, &look(&spots), begin, 0.0, &mut outline);
+        track.is_published = true;
+        let mut is_missed_after = |count: usize, revolution: u32| {
+            let end = begin + Span::from_seconds(0.1 * f64::from(revolution));
+            let seen = &spots[..count];
+            track.measure(seen, &look(seen), end, 0.0, &mut outline);
+            track.is_missed()
+        };
+        assert!(!is_missed_after(spots.len(), 1));
+        assert!(is_missed_after(3, 2));
+        assert!(!is_missed_after(spots.len(), 3));
     }
 
     #[test]
@@ -166,7 +246,11 @@ mod tests {
         let mut waiting = at(0.0);
         (waiting.velocity_mps, waiting.standing) = (Vector2::zeros(), 1.0);
         for other in [elsewhere, back, faster, waiting] {
-            assert_eq!(other.off_from_m(&parted, 2.4, CYCLIST_M), None, "{other:?}");
+            let other = Parting {
+                at: at(0.6).at,
+                ..other
+            };
+            assert_eq!(other.off_from_m(&parted, CYCLIST_M), None, "{other:?}");
         }
     }
 
@@ -174,10 +258,10 @@ mod tests {
     fn who_stood_is_found_where_it_stood() {
         let mut stood = at(0.0);
         (stood.velocity_mps, stood.standing) = (Vector2::zeros(), 1.0);
-        let mut seen = stood;
+        let mut seen = later(stood, 3.0);
         seen.position_m.x += 0.4;
-        assert!(seen.off_from_m(&stood, 3.0, 0.5).is_some());
+        assert!(seen.off_from_m(&stood, 0.5).is_some());
         seen.position_m.x += 1.5;
-        assert_eq!(seen.off_from_m(&stood, 3.0, 0.5), None);
+        assert_eq!(seen.off_from_m(&stood, 0.5), None);
     }
 }
