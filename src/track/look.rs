@@ -238,7 +238,7 @@ const UNKNOWN_ROUGHNESS_M: f64 = 0.03;
 mod tests {
     use super::*;
     use crate::cloud::tests::scan_of;
-    use crate::track::tests::with_scene;
+    use crate::track::tests::spots_of;
 
     #[test]
     fn the_ends_of_a_group_are_its_outermost_columns_in_whatever_order_it_comes() {
@@ -247,17 +247,7 @@ mod tests {
             4..9 if columns.contains(&column) => 1000,
             _ => 0,
         });
-        let mut spots: Vec<Spot> = with_scene(&scan, |scene| {
-            let points = columns
-                .clone()
-                .flat_map(|column| (4..9).map(move |layer| column * MAX_LAYERS + layer));
-            points
-                .map(|point| {
-                    let [x, y, _] = scan.point_m(point);
-                    Spot::new(scene, point as u32, [x, y], 0)
-                })
-                .collect()
-        });
+        let mut spots = spots_of(&scan);
         for turn in [0, 35, 50] {
             spots.rotate_left(turn);
             // Azimuths grow clockwise.

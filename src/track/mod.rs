@@ -259,8 +259,21 @@ impl Tracker {
 
 #[cfg(test)]
 mod tests {
+    use super::spots::Spot;
     use super::*;
     use crate::ground::{Origin, Plane};
+
+    /// All returns of a scan, seen by a sensor at the origin.
+    pub(super) fn spots_of(scan: &Scan) -> Vec<Spot> {
+        let points = (0..scan.len()).filter(|point| scan.range_m()[*point] > 0.0);
+        with_scene(scan, |scene| {
+            let spots = points.map(|point| {
+                let [x, y, _] = scan.point_m(point);
+                Spot::new(scene, point as u32, [x, y], 0)
+            });
+            spots.collect()
+        })
+    }
 
     /// What is seen by a sensor that stands still, 1.9 m above level ground.
     pub(super) fn with_scene<T>(scan: &Scan, look: impl FnOnce(&Scene<'_>) -> T) -> T {

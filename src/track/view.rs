@@ -190,7 +190,7 @@ impl View {
 mod tests {
     use super::*;
     use crate::cloud::tests::scan_of;
-    use crate::track::tests::with_scene;
+    use crate::track::tests::spots_of;
 
     #[test]
     fn a_short_piece_of_the_side_of_what_drives_may_be_any_part_of_it() {
@@ -199,15 +199,7 @@ mod tests {
             5..14 if (6..8).contains(&layer) => 3300,
             _ => 0,
         });
-        let spots: Vec<Spot> = with_scene(&scan, |scene| {
-            let points = (0..scan.len()).filter(|point| scan.range_m()[*point] > 0.0);
-            points
-                .map(|point| {
-                    let [x, y, _] = scan.point_m(point);
-                    Spot::new(scene, point as u32, [x, y], 0)
-                })
-                .collect()
-        });
+        let spots = spots_of(&scan);
         let look = Look::at(&spots, &scan, Vector2::zeros());
         let view = View::of(&look, &spots, 0.0);
         let centre_x_m = |expected_x_m: f64, is_moving: bool| {

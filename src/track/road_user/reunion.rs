@@ -152,7 +152,7 @@ mod tests {
     use crate::time::Span;
     use crate::track::look::Look;
     use crate::track::spots::Spot;
-    use crate::track::tests::with_scene;
+    use crate::track::tests::spots_of;
 
     const CYCLIST_M: f64 = 1.7;
 
@@ -210,15 +210,7 @@ mod tests {
             0..40 if (5..8).contains(&layer) => 1500,
             _ => 0,
         });
-        let spots: Vec<Spot> = with_scene(&scan, |scene| {
-            let points = (0..scan.len()).filter(|point| scan.range_m()[*point] > 0.0);
-            points
-                .map(|point| {
-                    let [x, y, _] = scan.point_m(point);
-                    Spot::new(scene, point as u32, [x, y], 0)
-                })
-                .collect()
-        });
+        let spots = spots_of(&scan);
         let look = |spots: &[Spot]| Look::at(spots, &scan, Vector2::zeros());
         let (mut outline, begin) = (vec![], scan.time());
         let mut track = Track::new(1, false, &spots, &look(&spots), begin, 0.0, &mut outline);
