@@ -327,6 +327,7 @@ fn floor_z_m(spots: &[Spot], scene: &Scene<'_>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cloud::Scan;
     use crate::cloud::tests::scan_of;
     use crate::cluster::{ClusterParameters, Dbscan};
     use crate::parameter::Profile;
@@ -336,20 +337,38 @@ mod tests {
     fn what_goes_on_above_in_most_of_its_columns_begins_no_track() {
         // A body of four layers and ten columns; what is above it is no part of it.
         let tracks = |going_on: usize| {
-            let scan = scan_of(1800, |column, layer| match column {
-                100..110 if (5..9).contains(&layer) => 1000,
-                100.. if column < 100 + going_on && layer == 9 => 1000,
-                _ => 0,
-            });
-            let left_out: Vec<bool> = (0..scan.len()).map(|point| scan.layer(point) > 8).collect();
-            with_scene(&scan, |scene| {
-                let mut dbscan = Dbscan::new(&ClusterParameters::profile(Profile::Default));
-                let clusters = dbscan.process(&scan, &left_out, scene.heights_m);
-                let mut tracker = ObjectTracker::default();
-                tracker.process(clusters, scene, &TrackParameters::profile(Profile::Default));
-                tracker.tracks.len()
-            })
+            let mut tracker = ObjectTracker::default();
+            see(&mut tracker, &body(1000, going_on));
+            tracker.tracks.len()
         };
         assert_eq!((tracks(5), tracks(8)), (1, 0));
+    }
+
+    #[test]
+    fn what_is_known_begins_no_other_track_and_what_rays_pass_through_is_dropped() {
+        let mut tracker = ObjectTracker::default();
+        (0..4).for_each(|_| see(&mut tracker, &body(1000, 0)));
+        assert_eq!((tracker.tracks.len(), tracker.next_id), (1, 1));
+        (0..6).for_each(|_| see(&mut tracker, &body(0, 0)));
+        assert_eq!((tracker.tracks.len(), tracker.next_id), (0, 1));
+    }
+
+    /// Four layers and ten columns at a range; in some columns the ray above them meets more.
+    fn body(range_cm: u16, going_on: usize) -> Scan {
+        scan_of(1800, |column, layer| match column {
+            100..110 if (5..9).contains(&layer) => range_cm,
+            100.. if column < 100 + going_on && layer == 9 => range_cm,
+            _ => 0,
+        })
+    }
+
+    /// A revolution that is clustered up to the eighth layer.
+    fn see(tracker: &mut ObjectTracker, scan: &Scan) {
+        let left_out: Vec<bool> = (0..scan.len()).map(|point| scan.layer(point) > 8).collect();
+        with_scene(scan, |scene| {
+            let mut dbscan = Dbscan::new(&ClusterParameters::profile(Profile::Default));
+            let clusters = dbscan.process(scan, &left_out, scene.heights_m);
+            tracker.process(clusters, scene, &TrackParameters::profile(Profile::Default));
+        });
     }
 }
