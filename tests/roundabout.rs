@@ -15,6 +15,8 @@ use kreisel::wire::Envelope;
 const REACH_M: f64 = 30.0;
 /// With fewer returns a road user is hardly in view: at 30 m a car has 40.
 const LEAST_POINTS: usize = 20;
+/// With fewer it counts nowhere.
+const FEWEST_POINTS: usize = 5;
 /// Revolutions in view before it must be known, and out of view after which it may be forgotten.
 const SETTLING: usize = 5;
 /// Farther off is another object.
@@ -38,6 +40,37 @@ fn distance_m(object: &Object, truth: &TrueObject) -> f64 {
     (object.centre_m[0] - x).hypot(object.centre_m[1] - y)
 }
 
+/// How far the object at a road user's place is from it, and its id.
+fn nearest(user: &TrueObject, objects: &[Object]) -> Option<(f64, u32)> {
+    let near = objects
+        .iter()
+        .map(|object| (distance_m(object, user), object.id));
+    let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0));
+    nearest.filter(|(distance_m, _)| *distance_m < MATCH_M)
+}
+
+/// Shows each road user of so many revolutions, with the objects that were found.
+fn play(
+    profile: Profile,
+    seed: u64,
+    revolutions: usize,
+    mut look: impl FnMut(&TrueObject, &[Object]),
+) {
+    let scenario = scenario::find("roundabout-waiting").unwrap();
+    let mut simulation = Simulation::new(scenario, seed);
+    let mut pipeline = Pipeline::new(&Configuration::profile(profile), 0);
+    for _ in 0..revolutions {
+        let mut frame = vec![];
+        let truth = simulation.revolve(&mut frame);
+        let (envelope, _) = Envelope::from_datagram(&frame).unwrap();
+        let outcome = pipeline.handle(&envelope);
+        assert!(matches!(outcome, Ok(Outcome::Revolution(_))), "{outcome:?}");
+        for user in &truth.objects {
+            look(user, pipeline.objects());
+        }
+    }
+}
+
 impl Record {
     fn note(&mut self, user: &TrueObject, objects: &[Object]) {
         let [x, y] = user.centre_m;
@@ -54,11 +87,7 @@ impl Record {
         if self.in_view <= SETTLING {
             return;
         }
-        let near = objects
-            .iter()
-            .map(|object| (distance_m(object, user), object.id));
-        let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0));
-        match nearest.filter(|(distance_m, _)| *distance_m < MATCH_M) {
+        match nearest(user, objects) {
             None => self.missed += 1,
             Some((distance_m, id)) => {
                 self.errors_m.push(distance_m);
@@ -78,23 +107,13 @@ impl Record {
 
 /// What became of every road user in so many revolutions.
 fn drive(profile: Profile, seed: u64, revolutions: usize) -> BTreeMap<u32, (Class, Record)> {
-    let scenario = scenario::find("roundabout-waiting").unwrap();
-    let mut simulation = Simulation::new(scenario, seed);
-    let mut pipeline = Pipeline::new(&Configuration::profile(profile), 0);
     let mut records: BTreeMap<u32, (Class, Record)> = BTreeMap::new();
-    for _ in 0..revolutions {
-        let mut frame = vec![];
-        let truth = simulation.revolve(&mut frame);
-        let (envelope, _) = Envelope::from_datagram(&frame).unwrap();
-        let outcome = pipeline.handle(&envelope);
-        assert!(matches!(outcome, Ok(Outcome::Revolution(_))), "{outcome:?}");
-        for user in &truth.objects {
-            let (_, record) = records
-                .entry(user.id)
-                .or_insert_with(|| (user.class, Record::default()));
-            record.note(user, pipeline.objects());
-        }
-    }
+    play(profile, seed, revolutions, |user, objects| {
+        let (_, record) = records
+            .entry(user.id)
+            .or_insert_with(|| (user.class, Record::default()));
+        record.note(user, objects);
+    });
     records.retain(|_, (_, record)| record.errors_m.len() > 10);
     records
 }
@@ -140,25 +159,16 @@ fn the_thesis_profile_sees_the_same_road_users_and_changes_their_ids() {
 fn what_drives_around_the_island_keeps_its_id() {
     let (mut changes, mut minutes) = (0, 0.0);
     for seed in [13, 16, 24] {
-        let scenario = scenario::find("roundabout-waiting").unwrap();
-        let mut simulation = Simulation::new(scenario, seed);
-        let mut pipeline = Pipeline::new(&Configuration::profile(Profile::Default), 0);
         let mut ids: BTreeMap<u32, u32> = BTreeMap::new();
-        for _ in 0..250 {
-            let mut frame = vec![];
-            let truth = simulation.revolve(&mut frame);
-            let (envelope, _) = Envelope::from_datagram(&frame).unwrap();
-            pipeline.handle(&envelope).unwrap();
-            for user in truth.objects.iter().filter(|user| user.points >= 5) {
-                minutes += 1.0 / 600.0;
-                let near = pipeline.objects().iter();
-                let near = near.map(|object| (distance_m(object, user), object.id));
-                let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0));
-                if let Some((_, id)) = nearest.filter(|(distance_m, _)| *distance_m < MATCH_M) {
-                    changes += u32::from(ids.insert(user.id, id).is_some_and(|was| was != id));
-                }
+        play(Profile::Default, seed, 250, |user, objects| {
+            if user.points < FEWEST_POINTS {
+                return;
             }
-        }
+            minutes += 1.0 / 600.0;
+            if let Some((_, id)) = nearest(user, objects) {
+                changes += u32::from(ids.insert(user.id, id).is_some_and(|was| was != id));
+            }
+        });
     }
     println!("{changes} changes of id in {minutes:.1} minutes of objects");
     assert!(f64::from(changes) < 0.2 * minutes, "{changes}");

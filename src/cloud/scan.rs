@@ -6,6 +6,7 @@ use super::{CloudParameters, Revolution};
 use crate::ego::wrapped_rad;
 use crate::time::Time;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// Columns that the array holds (thesis section 4.1.2: `Points[2000][16]`), enough for a
 /// sensor that turns at 9.05 Hz or faster.
@@ -186,6 +187,13 @@ impl Scan {
         Some((self.column_at(middle_rad + low), count.min(self.columns)))
     }
 
+    /// The same columns up to the seam and beyond it; none where there are none to tell.
+    pub fn stretches_across(&self, corners_m: &[[f64; 2]; 4]) -> [Range<usize>; 2] {
+        let (first, count) = self.columns_across(corners_m).unwrap_or_default();
+        let over = (first + count).saturating_sub(self.columns);
+        [first..first + count - over, 0..over]
+    }
+
     /// The column nearest to an azimuth.
     pub fn column_at(&self, azimuth_rad: f64) -> usize {
         let turn_rad = azimuth_rad - self.start_rad;
@@ -236,6 +244,11 @@ impl Scan {
     /// Where a point stands in the arrays.
     pub const fn index(&self, column: usize, layer: usize) -> usize {
         column * MAX_LAYERS + layer
+    }
+
+    /// Where the points of columns that follow each other stand in the arrays.
+    pub const fn points_of(&self, columns: &Range<usize>) -> Range<usize> {
+        self.index(columns.start, 0)..self.index(columns.end, 0)
     }
 
     /// The column that is counted beyond the last one, but not twice around: a division would take

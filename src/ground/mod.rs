@@ -281,7 +281,7 @@ impl Ground {
             .find(scan, &self.heights_m, &self.distances_m, &self.vehicles);
         self.edges.resize(scan.len(), false);
         for (columns, profile) in self.surface.stretches(scan) {
-            let points = scan.index(columns.start, 0)..scan.index(columns.end, 0);
+            let points = scan.points_of(&columns);
             let distances_m = &self.distances_m[points.clone()];
             let heights_m = &mut self.heights_m[points.clone()];
             let mask = &mut self.mask[points.clone()];

@@ -45,7 +45,7 @@ impl Vehicle {
         columns: Range<usize>,
         levels_m: &mut [[f32; MAX_LAYERS]],
     ) {
-        let points = scan.index(columns.start, 0)..scan.index(columns.end, 0);
+        let points = scan.points_of(&columns);
         let at_m = [scan.x_m(), scan.y_m()].map(|metres| &metres[points.clone()]);
         take_out(self, at_m, levels_m.as_flattened_mut());
     }
@@ -53,12 +53,8 @@ impl Vehicle {
     /// Takes the mark off what is clearly above the ground in its place: far away a single layer
     /// meets its bumper, as high as the ground may be unsure.
     pub(super) fn spare(&self, scan: &Scan, heights_m: &[f32], mask: &mut [bool]) {
-        let Some((first, count)) = scan.columns_across(&self.place.corners()) else {
-            return;
-        };
-        let over = (first + count).saturating_sub(scan.columns());
-        for columns in [first..first + count - over, 0..over] {
-            let points = scan.index(columns.start, 0)..scan.index(columns.end, 0);
+        for columns in scan.stretches_across(&self.place.corners()) {
+            let points = scan.points_of(&columns);
             let at_m = [scan.x_m(), scan.y_m()].map(|metres| &metres[points.clone()]);
             spare(self, at_m, &heights_m[points.clone()], &mut mask[points]);
         }

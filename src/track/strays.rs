@@ -42,15 +42,10 @@ impl Strays {
             }
             let place = track.rectangle();
             let corners = place.corners().map(|corner| placement.sensor_m(corner));
-            let Some((first, count)) = scan.columns_across(&corners) else {
-                continue;
-            };
             let outline = place.outline();
             let heights_m = [LOW_M, track.height_m() + ABOVE_M].map(|metres| metres as f32);
-            let columns = scan.columns();
-            let over = (first + count).saturating_sub(columns);
-            for stretch in [first..first + count - over, 0..over] {
-                let points = scan.index(stretch.start, 0)..scan.index(stretch.end, 0);
+            for columns in scan.stretches_across(&corners) {
+                let points = scan.points_of(&columns);
                 self.mark(scene, clusters, points.clone(), heights_m);
                 for point in marked(&self.marks).map(|place| points.start + place) {
                     let [x, y, _] = scan.point_m(point).map(f64::from);

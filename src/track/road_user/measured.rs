@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 
 use super::reunion::Parting;
-use super::{MOVING_MPS, Track, USUAL_GAIN};
+use super::{MOVING_MPS, Track};
 use crate::time::{Span, Time};
 use crate::track::class::{Belief, Qualities};
 use crate::track::look::Look;
@@ -42,7 +42,7 @@ impl Track {
         self.last_measured = seen_at;
         self.is_hidden = false;
         self.points = look.points;
-        self.usual_points += USUAL_GAIN * (look.points as f64 - self.usual_points);
+        self.usual_points += 0.2 * (look.points as f64 - self.usual_points);
         self.range_m = look.range_m;
         self.floor_z_m = floor_z_m;
         self.roughness_m += 0.2 * (look.roughness_m - self.roughness_m);

@@ -37,8 +37,6 @@ const MOVING_MPS: f64 = 0.6;
 const SURELY_MET: f64 = 8.0;
 /// Part of the doubt that is left for what is met least.
 const LEAST_TELLING: f64 = 0.3;
-/// Gain by which the usual returns follow.
-const USUAL_GAIN: f64 = 0.2;
 
 #[derive(Debug, Clone)]
 pub(super) struct Track {

@@ -116,7 +116,7 @@ impl Track {
         let length_m = lost.shape.size_m(lost.belief.vehicle())[0];
         // A few returns may have been taken for the old one where this one was already seen.
         let is_apart =
-            lost.parted.at < self.first_seen || lost.parted.points < 0.5 * self.parted.points;
+            lost.parted.at < self.first_seen || lost.parted.points < CLEAR * self.parted.points;
         let is_in_time = gap_s > 0.0 && gap_s <= LONGEST_S;
         if !is_in_time || !is_apart || self.shape.seen_m[0] > length_m + GROWTH_M {
             return None;
