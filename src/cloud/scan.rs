@@ -312,6 +312,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::cloud::{ByteOrderSource, Dialect};
     use crate::parameter::Profile;
+    use crate::time::Span;
     use crate::wire::point_cloud::{ByteOrder, CompactPointCloud};
 
     /// A scan of centimetres, `columns` around the circle.
@@ -339,6 +340,14 @@ pub(crate) mod tests {
             &CloudParameters::profile(Profile::Default),
         );
         scan
+    }
+
+    /// The same scan at a later time.
+    pub(crate) fn later(scan: &Scan, seconds: f64) -> Scan {
+        Scan {
+            time: scan.time + Span::from_seconds(seconds),
+            ..scan.clone()
+        }
     }
 
     fn revolution(distances: &[u8]) -> Revolution<'_> {

@@ -121,6 +121,7 @@ mod tests {
                 margin_m: 1.2,
                 most_m: [2.0; 2],
                 yaw_rad: 0.0,
+                rests: false,
             }
         });
         Forecasts::from(boxes.to_vec())

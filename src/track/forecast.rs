@@ -17,6 +17,8 @@ pub(super) struct Forecast {
     pub(super) margin_m: f32,
     pub(super) most_m: [f64; 2],
     pub(super) yaw_rad: f64,
+    /// Nothing of it is looked at.
+    pub(super) rests: bool,
 }
 
 /// Around the box of a track its returns may lie this far out, and farther where it is unsure.
@@ -31,6 +33,7 @@ impl Forecast {
             margin_m: (LEAST_MARGIN_M + track.spread_m()).min(MOST_MARGIN_M) as f32,
             most_m: track.most_m(),
             yaw_rad: track.yaw_rad(),
+            rests: track.rests(),
         }
     }
 }

@@ -120,20 +120,24 @@ impl Grouping {
             let placed = self.placer.placed(patch);
             self.claims
                 .settle(placed, &self.near, &self.forecasts, is_whole);
+            // A part that reaches out of the only box belongs to it as long as the whole can be
+            // one object.
+            let only = self.claims.only();
+            let owner = only.filter(|(_, share)| is_whole && *share > LEAST_CLAIM);
+            let owner = owner.map(|(track, _)| track);
+            let rests = |track: usize| self.forecasts.of(track).rests;
+            if owner.is_some_and(rests) {
+                continue;
+            }
             for (placed, track) in placed.iter().zip(self.claims.owners()) {
-                if let Some(group) = track.map(|track| track as u32).or(is_whole.then_some(own)) {
+                let group = track.map(|track| track as u32).or(is_whole.then_some(own));
+                if let Some(group) = group.filter(|_| !track.is_some_and(rests)) {
                     self.spots
                         .push(Spot::new(scene, placed.point, placed.at_m, group));
                 }
             }
             let spots = &mut self.spots[begin..];
-            // A part that reaches out of the only box belongs to it as long as the whole can be
-            // one object.
-            if is_whole
-                && let Some((track, share)) = self.claims.only()
-                && share > LEAST_CLAIM
-                && fits(spots, self.forecasts.of(track))
-            {
+            if let Some(track) = owner.filter(|track| fits(spots, self.forecasts.of(*track))) {
                 for spot in spots.iter_mut() {
                     spot.group = track as u32;
                 }

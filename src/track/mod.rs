@@ -6,8 +6,8 @@
 //! what is hidden and what is gone; `nearby` spares all of them what is far away. A
 //! `road_user` learns from each `look`, and the `view` of it in the road user's own axes, its
 //! `motion`, its `shape`, its `class`, and by its `trail` whether it moves; `existence` says whether
-//! it is there at all; and one that was lost gets its id back (`road_user`). `nearest` is the
-//! tracking of the thesis.
+//! it is there at all; what stands and is hardly a road user rests most of the time, and one that
+//! was lost gets its id back (`road_user`). `nearest` is the tracking of the thesis.
 
 mod assignment;
 

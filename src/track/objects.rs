@@ -20,6 +20,8 @@ use crate::time::{Span, Time};
 #[derive(Debug, Clone, Default)]
 pub(super) struct ObjectTracker {
     next_id: u32,
+    /// How many revolutions there were.
+    revolution: u32,
     tracks: Vec<Track>,
     /// Of which nothing was left, but which may be seen again.
     lost: Vec<Track>,
@@ -94,6 +96,10 @@ impl ObjectTracker {
         parameters: &TrackParameters,
     ) {
         let end = scene.scan.time();
+        self.revolution = self.revolution.wrapping_add(1);
+        for track in &mut self.tracks {
+            track.rest(self.revolution, end, parameters.least_confidence);
+        }
         self.predict(scene, end);
         self.grouping
             .form(&self.tracks, clusters, scene, parameters);
@@ -105,10 +111,10 @@ impl ObjectTracker {
         self.publish(end, parameters);
     }
 
-    /// Every track to the time at which the sensor passed over its place.
+    /// Every track that is looked at to the time at which the sensor passed over its place.
     fn predict(&mut self, scene: &Scene<'_>, end: Time) {
         let placement = scene.sweep.sensor.placement();
-        for track in &mut self.tracks {
+        for track in self.tracks.iter_mut().filter(|track| !track.rests()) {
             let expected = track.position_m()
                 + track.velocity_mps() * (end - track.last_measured).seconds().clamp(0.0, 0.2);
             let [x, y] = placement.sensor_m(expected.into());
@@ -156,10 +162,11 @@ impl ObjectTracker {
             for row in self.reaches.near(middle_m) {
                 let track = &self.tracks[row];
                 let (_, outline) = &self.places[row];
-                let is_near = outline
-                    .distance_within_m(middle_m.into(), leap_m(track))
-                    .is_some();
-                if is_near && group.claimed_by != Some(row) {
+                if track.rests() || group.claimed_by == Some(row) {
+                    continue;
+                }
+                let off_m = outline.distance_within_m(middle_m.into(), leap_m(track));
+                if off_m.is_some() {
                     add(row, track.cost(spots, &group.look) + CLAIM_BONUS);
                 }
             }
@@ -179,6 +186,7 @@ impl ObjectTracker {
                     let floor_z_m = floor_z_m(spots, scene);
                     track.measure(spots, &group.look, end, floor_z_m, &mut self.outline);
                 }
+                None if track.rests() => {}
                 None => {
                     let (place, height_m) = (track.rectangle(), track.height_m());
                     let sight =
@@ -328,7 +336,7 @@ fn floor_z_m(spots: &[Spot], scene: &Scene<'_>) -> f64 {
 mod tests {
     use super::*;
     use crate::cloud::Scan;
-    use crate::cloud::tests::scan_of;
+    use crate::cloud::tests::{later, scan_of};
     use crate::cluster::{ClusterParameters, Dbscan};
     use crate::parameter::Profile;
     use crate::track::tests::with_scene;
@@ -351,6 +359,28 @@ mod tests {
         assert_eq!((tracker.tracks.len(), tracker.next_id), (1, 1));
         (0..6).for_each(|_| see(&mut tracker, &body(0, 0)));
         assert_eq!((tracker.tracks.len(), tracker.next_id), (0, 1));
+    }
+
+    #[test]
+    fn what_rests_keeps_what_lies_in_its_place_unseen() {
+        let (post, nothing) = (body(1000, 5), body(0, 0));
+        let mut tracker = ObjectTracker::default();
+        let mut looks = 0;
+        for revolution in 0..30 {
+            let scan = later(&post, 0.1 * f64::from(revolution));
+            see(&mut tracker, &scan);
+            let [track] = &tracker.tracks[..] else {
+                panic!("{}", tracker.tracks.len());
+            };
+            looks += u32::from(
+                revolution >= 18 && scan.time() - track.last_measured < Span::from_seconds(0.1),
+            );
+        }
+        assert_eq!((looks, tracker.next_id), (4, 1));
+        for revolution in 30..36 {
+            see(&mut tracker, &later(&nothing, 0.1 * f64::from(revolution)));
+        }
+        assert_eq!(tracker.tracks.len(), 0);
     }
 
     /// Four layers and ten columns at a range; in some columns the ray above them meets more.

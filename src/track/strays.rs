@@ -37,7 +37,7 @@ impl Strays {
         let placement = sweep.sensor.placement();
         let origin_m = placement.origin_m();
         for (number, track) in tracks.iter().enumerate() {
-            if !track.is_confirmed() || !track.is_sparse() {
+            if !track.is_confirmed() || !track.is_sparse() || track.rests() {
                 continue;
             }
             let place = track.rectangle();

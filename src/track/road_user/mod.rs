@@ -6,6 +6,8 @@ mod measured;
 
 mod published;
 
+mod rest;
+
 mod reunion;
 
 use super::class::Belief;
@@ -72,6 +74,8 @@ pub(super) struct Track {
     parted: Parting,
     /// Whether others know its id.
     pub(super) is_published: bool,
+    /// Whether it is not looked at now.
+    rests: bool,
 }
 
 impl Track {
@@ -112,6 +116,7 @@ impl Track {
             floor_z_m,
             parted: Parting::default(),
             is_published: false,
+            rests: false,
         };
         track.belief = Belief::of(&track.qualities());
         let view = View::of(look, spots, track.shape.yaw_rad);
