@@ -25,6 +25,16 @@ pub(crate) fn count(marks: &[bool]) -> usize {
     words(marks).map(|word| word.count_ones() as usize).sum()
 }
 
+/// The bits that are set, from the lowest on.
+#[inline(always)]
+pub(crate) fn set_bits(mut bits: u16) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = bits.trailing_zeros();
+        bits &= bits.wrapping_sub(1);
+        (bit < u16::BITS).then_some(bit as usize)
+    })
+}
+
 /// A bit for each mark, the first one lowest; the last word is filled up with none.
 fn words(marks: &[bool]) -> impl Iterator<Item = u64> {
     let (chunks, rest) = marks.as_chunks::<AT_ONCE>();

@@ -6,6 +6,7 @@ use super::{GridParameters, NoReturn};
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::float::{greatest, greatest_of, least, least_of};
 use crate::ground::Plane;
+use crate::marks::set_bits;
 
 /// The rays of a revolution over the ground, by columns and layers. From the side a ray is
 /// straight: its height above the ground changes evenly with the horizontal distance.
@@ -19,9 +20,9 @@ pub(super) struct Evidence {
     runs: Vec<[f32; MAX_LAYERS]>,
     /// Distance of every return, between the columns beside the first and the last.
     returns_m: Vec<[f32; MAX_LAYERS]>,
-    /// Distance of every return that is an obstacle.
-    obstacles_m: Vec<[f32; MAX_LAYERS]>,
-    /// Of a column's nearest obstacle, between the columns beside the first and the last.
+    /// Whether each return is an obstacle within reach.
+    is_obstacle: Vec<[bool; MAX_LAYERS]>,
+    /// Distance of a column's nearest obstacle, between the columns beside the first and the last.
     nearest_m: Vec<f32>,
     /// How far each ray is known to be free, by itself and by those beside it.
     free_m: Vec<f32>,
@@ -49,14 +50,9 @@ const BEFORE_RETURN_M: f32 = 0.05;
 const UNSURE_PER_M: f32 = 0.02;
 
 impl Evidence {
-    /// Distance of a column's nearest obstacle.
-    pub(super) fn nearest_m(&self, column: usize) -> f32 {
-        self.nearest_m[BESIDE + column]
-    }
-
-    /// Distances of a column's obstacles, by layers; [`NONE_M`] where there is none.
-    pub(super) fn obstacles_m(&self, column: usize) -> &[f32; MAX_LAYERS] {
-        &self.obstacles_m[column]
+    /// Of every point of the scan whether it is an obstacle within reach.
+    pub(super) fn is_obstacle(&self) -> &[bool] {
+        self.is_obstacle.as_flattened()
     }
 
     /// Puts the columns beside the first and the last around them: those on the other side of
@@ -143,35 +139,47 @@ impl Evidence {
         parameters: &GridParameters,
         stretches: &mut Stretches<'_>,
     ) {
-        let (returns_m, obstacles_m) =
-            (&self.returns_m[BESIDE + column], &self.obstacles_m[column]);
+        let returns_m = &self.returns_m[BESIDE + column];
         let (ends_m, runs) = (&self.ends_m[column], &self.runs[column]);
         let until_m = parameters.low_pass_m as f32 - self.sensor_m;
         // A ray below an obstacle that higher rays met goes on under it.
-        let mut roof_m = parameters.reach_m as f32;
-        for layer in (0..MAX_LAYERS).rev() {
-            if (returns_m[layer] < NONE_M) & (ends_m[layer] > before_m) {
-                let end_m = least(least(ends_m[layer], below_m(until_m, runs[layer])), roof_m);
-                stretches.add(from_m(until_m, runs[layer]).max(before_m), end_m);
-            }
-            roof_m = least(roof_m, obstacles_m[layer]);
+        let mut roofs_m = [parameters.reach_m as f32; MAX_LAYERS];
+        for layer in (1..MAX_LAYERS).rev() {
+            let is_obstacle = self.is_obstacle[column][layer];
+            let own_m = if is_obstacle {
+                returns_m[layer]
+            } else {
+                NONE_M
+            };
+            roofs_m[layer - 1] = least(roofs_m[layer], own_m);
+        }
+        let (mut froms_m, mut tos_m) = ([0.0; MAX_LAYERS], [0.0; MAX_LAYERS]);
+        let mut passes = 0;
+        for layer in 0..MAX_LAYERS {
+            let landed_m = least(ends_m[layer], below_m(until_m, runs[layer]));
+            tos_m[layer] = least(landed_m, roofs_m[layer]);
+            froms_m[layer] = greatest(from_m(until_m, runs[layer]), before_m);
+            let is_over = (returns_m[layer] < NONE_M) & (ends_m[layer] > before_m);
+            passes |= u16::from(is_over & (froms_m[layer] < tos_m[layer])) << layer;
+        }
+        for layer in set_bits(passes) {
+            stretches.add(froms_m[layer], tos_m[layer]);
         }
     }
 
     /// Height below which the lowest of a column's rays that go on beyond a distance is, as far
     /// as that is known. A ray that lands has a known height all along.
     pub(super) fn lowest_pass_m(&self, column: usize, distance_m: f32, ground: &[bool]) -> f32 {
-        let ground = &ground[column * MAX_LAYERS..];
-        let rays = self.ends_m[column]
-            .iter()
-            .zip(&self.runs[column])
-            .zip(ground);
-        rays.filter(|((end_m, _), _)| **end_m > distance_m)
-            .map(|((_, run), lands)| {
-                let unsure_per_m = if *lands { 0.0 } else { UNSURE_PER_M };
-                self.sensor_m + (1.0 / run + unsure_per_m) * distance_m
-            })
-            .fold(f32::MAX, f32::min)
+        let ground = &ground.as_chunks::<MAX_LAYERS>().0[column];
+        let (ends_m, runs) = (&self.ends_m[column], &self.runs[column]);
+        let mut passes_m = [f32::MAX; MAX_LAYERS];
+        for layer in 0..MAX_LAYERS {
+            let unsure_per_m = if ground[layer] { 0.0 } else { UNSURE_PER_M };
+            let pass_m = self.sensor_m + (1.0 / runs[layer] + unsure_per_m) * distance_m;
+            let goes_on = ends_m[layer] > distance_m;
+            passes_m[layer] = if goes_on { pass_m } else { f32::MAX };
+        }
+        least_of(passes_m)
     }
 }
 
@@ -207,11 +215,12 @@ pub(super) fn gather(
     evidence.sensor_m = plane.height_m() as f32;
     let (low_m, high_m) = (parameters.obstacle_low_m, parameters.obstacle_high_m);
     let (low_m, high_m) = (low_m as f32, high_m as f32);
+    let reach_m = parameters.reach_m as f32;
     let no_return_m = match parameters.no_return {
-        NoReturn::Clear => parameters.reach_m,
-        NoReturn::Limit => parameters.no_return_limit_m,
+        NoReturn::Clear => reach_m,
+        NoReturn::Limit => parameters.no_return_limit_m as f32,
         NoReturn::Ignore => 0.0,
-    } as f32;
+    };
     let normal = plane.normal().map(|part| part as f32);
     let slopes: [_; MAX_LAYERS] = std::array::from_fn(|layer| scan.slope(layer));
     let tangents = slopes.map(|(tangent, _)| tangent as f32);
@@ -220,10 +229,10 @@ pub(super) fn gather(
         &mut evidence.ends_m,
         &mut evidence.runs,
         &mut evidence.returns_m,
-        &mut evidence.obstacles_m,
     ] {
         rays.clear();
     }
+    evidence.is_obstacle.clear();
     evidence.nearest_m.clear();
     evidence.nearest_m.extend([NONE_M; BESIDE]);
     evidence.returns_m.extend([[NONE_M; MAX_LAYERS]; BESIDE]);
@@ -236,6 +245,7 @@ pub(super) fn gather(
         let mut runs = [0.0; MAX_LAYERS];
         let mut ends_m = [0.0; MAX_LAYERS];
         let mut returns_m = [NONE_M; MAX_LAYERS];
+        let mut is_obstacle = [false; MAX_LAYERS];
         let mut obstacles_m = [NONE_M; MAX_LAYERS];
         for layer in 0..MAX_LAYERS {
             let (range_m, height_m) = (ranges_m[layer], heights_m[column][layer]);
@@ -259,8 +269,9 @@ pub(super) fn gather(
             } else {
                 0.0
             };
-            let is_obstacle =
-                has_return & !ground[column][layer] & (height_m >= low_m) & (height_m <= high_m);
+            let is_body = (height_m >= low_m) & (height_m <= high_m);
+            let is_near = has_return & (distance_m <= reach_m);
+            is_obstacle[layer] = is_near & !ground[column][layer] & is_body;
             runs[layer] = run;
             ends_m[layer] = if has_return {
                 distance_m - BEFORE_RETURN_M
@@ -268,12 +279,16 @@ pub(super) fn gather(
                 unseen_m
             };
             returns_m[layer] = if has_return { distance_m } else { NONE_M };
-            obstacles_m[layer] = if is_obstacle { distance_m } else { NONE_M };
+            obstacles_m[layer] = if is_obstacle[layer] {
+                distance_m
+            } else {
+                NONE_M
+            };
         }
         evidence.runs.push(runs);
         evidence.ends_m.push(ends_m);
         evidence.returns_m.push(returns_m);
-        evidence.obstacles_m.push(obstacles_m);
+        evidence.is_obstacle.push(is_obstacle);
         evidence.nearest_m.push(least_of(obstacles_m));
     }
     evidence.nearest_m.extend([NONE_M; BESIDE]);

@@ -10,6 +10,7 @@ use super::window::{Cell, Window};
 use crate::cloud::Scan;
 use crate::ego::Placement;
 use crate::float::rounded;
+use crate::marks::set_bits;
 
 /// Log-odds that are added to cells, and their bounds.
 #[derive(Debug, Clone)]
@@ -63,15 +64,6 @@ fn any(cells: [i16; BLOCK]) -> bool {
     any != 0
 }
 
-/// The set bits, from the lowest on.
-fn set(mut cells: u16) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let cell = cells.trailing_zeros() as usize;
-        cells &= cells.wrapping_sub(1);
-        (cell < BLOCK).then_some(cell)
-    })
-}
-
 /// How far below the top of what was seen in a cell a ray must pass to say that it is gone, and
 /// below which share of its height: windows let rays through, doors do not.
 const BELOW_TOP_M: f32 = 0.15;
@@ -121,7 +113,7 @@ impl Filter {
                 is_occupied[cell] = i16::from(before[cell] > 0);
             }
             if any(is_occupied) {
-                for cell in set(cells).filter(|cell| before[*cell] > 0) {
+                for cell in set_bits(cells).filter(|cell| before[*cell] > 0) {
                     let place = [f64::from(east) + cell as f64, f64::from(north)];
                     let at_m = [0, 1].map(|axis| sensor_m[axis] + place[axis] * self.cell_m);
                     let distance_m = libm::hypot(place[0], place[1]) * self.cell_m;

@@ -27,6 +27,7 @@ pub use map::{Map, TILE_CELLS, Tile};
 use crate::cloud::{CAPACITY, Scan};
 use crate::ego::{Placement, Sweep};
 use crate::ground::Plane;
+use crate::marks::marked;
 use crate::parameter::{choices, parameters};
 use crate::time::Time;
 use crate::track::Object;
@@ -292,22 +293,16 @@ impl Grid {
         }
         self.hits.clear();
         let (per_cell, corner) = (1.0 / self.parameters.cell_m, self.window.corner());
-        let reach_m = self.parameters.reach_m as f32;
-        let within = |column: &usize| self.evidence.nearest_m(*column) <= reach_m;
-        for column in (0..scan.columns()).filter(within) {
-            let obstacles_m = self.evidence.obstacles_m(column);
-            for (layer, distance_m) in obstacles_m.iter().enumerate() {
-                let point = scan.index(column, layer);
-                if *distance_m > reach_m || self.is_moving[point] {
-                    continue;
-                }
-                let [x, y, _] = scan.point_m(point).map(f64::from);
-                let at_m = placements[column].local_m([x, y]);
-                let cells = [0, 1].map(|axis| at_m[axis] * per_cell - corner[axis]);
-                if let Some(cell) = self.window.hit(cells) {
-                    let top = (perceived.heights_m[point] / HEIGHT_UNIT_M) as u8;
-                    self.hits.push((cell, top));
-                }
+        for point in marked(self.evidence.is_obstacle()) {
+            if self.is_moving[point] {
+                continue;
+            }
+            let [x, y, _] = scan.point_m(point).map(f64::from);
+            let at_m = placements[scan.column(point)].local_m([x, y]);
+            let cells = [0, 1].map(|axis| at_m[axis] * per_cell - corner[axis]);
+            if let Some(cell) = self.window.hit(cells) {
+                let top = (perceived.heights_m[point] / HEIGHT_UNIT_M) as u8;
+                self.hits.push((cell, top));
             }
         }
     }
