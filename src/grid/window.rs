@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use multiversion::multiversion;
+
 use super::map::TILE_CELLS;
 use crate::float::{greatest, least};
 
@@ -15,6 +17,7 @@ pub(super) struct Window {
     /// The tile in the south-west corner.
     first_tile: [i32; 2],
     passed: Vec<u64>,
+    /// Empty between two revolutions.
     hit: Vec<u64>,
     /// Cells at whose southern edge an outline comes into their row.
     crossed: Vec<u64>,
@@ -35,11 +38,10 @@ impl Window {
         }
     }
 
-    /// Empties it for a revolution with this tile in the south-west corner.
+    /// Begins a revolution with this tile in the south-west corner. All hits were taken.
     pub(super) fn begin(&mut self, first_tile: [i32; 2]) {
         self.first_tile = first_tile;
         self.passed.fill(0);
-        self.hit.fill(0);
     }
 
     /// Tiles along a side.
@@ -88,52 +90,42 @@ impl Window {
         let step = fixed(slope);
         let mut enters = fixed(x0 + (first as f64 - y0).max(0.0) * slope);
         let mut leaves = fixed(x0 + ((first + 1) as f64 - y0) * slope);
-        for row in first..=last {
+        let words = first * self.side..(last + 1) * self.side;
+        let passed = self.passed[words.clone()].chunks_exact_mut(self.side);
+        let crossed = self.crossed[words].chunks_exact_mut(self.side);
+        for (row, (passed, crossed)) in (first..).zip(passed.zip(crossed)) {
             // A cell that no outline crosses is within if an odd number of outlines passes the
             // row's southern edge to the left of it.
             if row > first || y0 < 0.0 {
-                self.cross(row, enters);
+                cross_row(crossed, enters);
             }
             if row == last && y1 < top {
                 leaves = fixed(x1);
             }
             if is_inside && row < last {
-                pass_row(self.passed_row(row), enters, leaves);
+                pass_row(passed, enters, leaves);
             } else {
-                pass_row_clipped(self.passed_row(row), enters, leaves);
+                pass_row_clipped(passed, enters, leaves);
             }
             (enters, leaves) = (leaves, leaves.wrapping_add(step));
         }
+        self.crossed_rows.start = self.crossed_rows.start.min(first);
+        self.crossed_rows.end = self.crossed_rows.end.max(last + 1);
     }
 
     fn passed_row(&mut self, row: usize) -> &mut [u64] {
         &mut self.passed[row * self.side..(row + 1) * self.side]
     }
 
-    /// An outline crosses the southern edge of a row.
-    fn cross(&mut self, row: usize, x: i64) {
-        let column = (x.max(0) >> FRACTION_BITS) as usize;
-        if column < self.cells() {
-            let word = row * self.side + column / TILE_CELLS;
-            self.crossed[word] ^= 1 << (column % TILE_CELLS);
-        }
-        self.crossed_rows.start = self.crossed_rows.start.min(row);
-        self.crossed_rows.end = self.crossed_rows.end.max(row + 1);
-    }
-
     /// Marks the cells within what was outlined, and begins a new outline.
     pub(super) fn pass_outlined(&mut self) {
-        for row in self.crossed_rows.clone() {
-            let words = row * self.side..(row + 1) * self.side;
+        let none = self.cells()..0;
+        let rows = std::mem::replace(&mut self.crossed_rows, none);
+        if rows.start < rows.end {
+            let words = rows.start * self.side..rows.end * self.side;
             let crossed = &mut self.crossed[words.clone()];
-            let mut is_within = 0;
-            for (crossed, passed) in crossed.iter_mut().zip(&mut self.passed[words]) {
-                let within = odd_below(std::mem::take(crossed)) ^ is_within;
-                *passed |= within;
-                is_within = ((within as i64) >> (TILE_CELLS - 1)) as u64;
-            }
+            pass_within(crossed, &mut self.passed[words], self.side);
         }
-        self.crossed_rows = self.cells()..0;
     }
 
     /// Marks the cell in which a ray ended, in cells from the south-west corner. Gives it, or
@@ -174,7 +166,28 @@ impl Window {
     }
 }
 
+/// Marks the cells of some rows that are within outlines, given where those cross the rows' edges,
+/// and forgets the latter.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn pass_within(crossed: &mut [u64], passed: &mut [u64], side: usize) {
+    for word in crossed.iter_mut() {
+        *word = odd_below(*word);
+    }
+    let rows = crossed
+        .chunks_exact_mut(side)
+        .zip(passed.chunks_exact_mut(side));
+    for (crossed, passed) in rows {
+        let mut is_within = 0;
+        for (odd, passed) in crossed.iter_mut().zip(passed) {
+            let within = std::mem::take(odd) ^ is_within;
+            *passed |= within;
+            is_within = ((within as i64) >> (TILE_CELLS - 1)) as u64;
+        }
+    }
+}
+
 /// The bits that have an odd number of ones up to and with themselves.
+#[inline(always)]
 fn odd_below(mut bits: u64) -> u64 {
     for shift in [1, 2, 4, 8, 16, 32] {
         bits ^= bits << shift;
@@ -193,6 +206,15 @@ fn fixed(cells: f64) -> i64 {
     const ONES: f64 = (3u64 << 51) as f64;
     let fractions = cells * (1u64 << FRACTION_BITS) as f64 + ONES;
     fractions.to_bits().wrapping_sub(ONES.to_bits()) as i64
+}
+
+/// An outline crosses the southern edge of a row, if it does so before the row's end.
+#[inline(always)]
+fn cross_row(row: &mut [u64], x: i64) {
+    let column = (x.max(0) >> FRACTION_BITS) as usize;
+    if let Some(word) = row.get_mut(column / TILE_CELLS) {
+        *word ^= 1 << (column % TILE_CELLS);
+    }
 }
 
 /// Marks the cells of a row from one place to another, both within the row.
