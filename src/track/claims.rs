@@ -119,8 +119,6 @@ mod tests {
                 outline: place.outline(),
                 middle_m: [x as f32, 0.0],
                 margin_m: 1.2,
-                most_m: [2.0; 2],
-                yaw_rad: 0.0,
                 rests: false,
             }
         });

@@ -15,8 +15,6 @@ pub(super) struct Forecast {
     pub(super) middle_m: [f32; 2],
     /// How far out of it its returns may lie.
     pub(super) margin_m: f32,
-    pub(super) most_m: [f64; 2],
-    pub(super) yaw_rad: f64,
     /// Nothing of it is looked at.
     pub(super) rests: bool,
 }
@@ -31,8 +29,6 @@ impl Forecast {
             outline: place.outline(),
             middle_m,
             margin_m: (LEAST_MARGIN_M + track.spread_m()).min(MOST_MARGIN_M) as f32,
-            most_m: track.most_m(),
-            yaw_rad: track.yaw_rad(),
             rests: track.rests(),
         }
     }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::Vector2;
 
 use super::claims::Claims;
-use super::forecast::{Forecast, Forecasts};
+use super::forecast::Forecasts;
 use super::look::Look;
 use super::patches::Placer;
 use super::rectangle::Extent;
@@ -137,7 +137,8 @@ impl Grouping {
                 }
             }
             let spots = &mut self.spots[begin..];
-            if let Some(track) = owner.filter(|track| fits(spots, self.forecasts.of(*track))) {
+            let top_m = f64::from(patch.bounds.top_m);
+            if let Some(track) = owner.filter(|track| fits(spots, top_m, &tracks[*track])) {
                 for spot in spots.iter_mut() {
                     spot.group = track as u32;
                 }
@@ -326,10 +327,10 @@ fn align_seam(spots: &mut [Spot], tracks: &[Track], duration_s: f64) {
     }
 }
 
-/// Whether spots can all belong to the object that is expected.
-fn fits(spots: &[Spot], forecast: &Forecast) -> bool {
-    let [low, high] = extent(spots, forecast.yaw_rad);
-    (0..2).all(|axis| high[axis] - low[axis] <= forecast.most_m[axis])
+/// Whether spots up to a height can all belong to an object.
+fn fits(spots: &[Spot], top_m: f64, track: &Track) -> bool {
+    let ([low, high], most_m) = (extent(spots, track.yaw_rad()), track.most_m(top_m));
+    (0..2).all(|axis| high[axis] - low[axis] <= most_m[axis])
 }
 
 /// Least and greatest coordinates of spots along and across a direction.

@@ -1,6 +1,8 @@
 //! The box of an object, as it is known by now: its direction and its size, which grows with the
 //! evidence.
 
+use std::ops::Range;
+
 use super::Rectangle;
 use super::look::Look;
 use super::spots::{Spot, places_m};
@@ -21,6 +23,8 @@ pub(super) struct Shape {
     pub(super) floor_m: f64,
     /// Whether motion has shown which end is the front.
     pub(super) front_known: bool,
+    /// How much like a lorry what drives is by its height: 0 to 1.
+    lorry: f64,
     /// Fits in a row that contradict the direction.
     contradictions: u32,
 }
@@ -30,10 +34,15 @@ pub(super) struct Shape {
 pub(super) const CAR_M: [f64; 2] = [4.3, 1.8];
 /// Standard deviation of a car's length and width around it.
 const CAR_DEVIATION_M: [f64; 2] = [0.4, 0.1];
+/// The same of what drives and is as high as a lorry or a bus: 7 to 12 m (Directive 96/53/EC).
+const LORRY_M: [f64; 2] = [10.0, 2.5];
+const LORRY_DEVIATION_M: [f64; 2] = [1.5, 0.1];
+/// From a car's height to that of a lorry; vans are in between.
+const LORRY_TOP_M: Range<f64> = 2.1..3.1;
 /// Standard deviation of a direction that nobody knows: uniform over a half turn.
 pub(super) const UNKNOWN_YAW_RAD: f64 = 0.9;
 /// A visible side between these is the front or rear of a car...
-const END_ON_M: std::ops::Range<f64> = 1.3..2.15;
+const END_ON_M: Range<f64> = 1.3..2.15;
 /// ...if so little of the other is seen.
 const END_ON_DEPTH_M: f64 = 0.9;
 
@@ -61,6 +70,7 @@ impl Shape {
             top_below_m: look.top_below_m,
             floor_m: look.floor_m,
             front_known: false,
+            lorry: 0.0,
             contradictions: 0,
         }
     }
@@ -70,7 +80,8 @@ impl Shape {
     pub(super) fn size_m(&self, vehicle: f64) -> [f64; 2] {
         [0, 1].map(|axis| {
             let hidden = (1.0 - self.whole[axis]) * vehicle;
-            let missing_m = (CAR_M[axis] - self.seen_m[axis]).max(0.0);
+            let assumed_m = self.between(CAR_M, LORRY_M)[axis];
+            let missing_m = (assumed_m - self.seen_m[axis]).max(0.0);
             let least_m = if vehicle > 0.5 {
                 [3.2, 1.5][axis]
             } else {
@@ -84,8 +95,13 @@ impl Shape {
     pub(super) fn size_deviation_m(&self, vehicle: f64) -> [f64; 2] {
         [0, 1].map(|axis| {
             let unsure = (1.0 - self.whole[axis]) * vehicle;
-            0.05 + unsure * CAR_DEVIATION_M[axis]
+            0.05 + unsure * self.between(CAR_DEVIATION_M, LORRY_DEVIATION_M)[axis]
         })
+    }
+
+    /// What holds for it of two values for a car and for a lorry.
+    fn between(&self, car: [f64; 2], lorry: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|axis| car[axis] + self.lorry * (lorry[axis] - car[axis]))
     }
 
     /// Learns from a further look in the axes of the yaw.
@@ -100,6 +116,8 @@ impl Shape {
         /// Wholes are believed within a few revolutions near the sensor.
         const WHOLE: f64 = 0.15;
         const CLEAR_RANGE_M: f64 = 25.0;
+        /// What is hidden is not reckoned with at once.
+        const LORRY: f64 = 0.2;
         // Seen askew, a box is longer and wider than the object.
         let askew_rad = libm::sqrt(self.yaw_variance).min(0.5);
         let extent = view.extent_m();
@@ -135,18 +153,27 @@ impl Shape {
             self.top_m += TOP_DOWN * (look.top_below_m - self.top_m);
         }
         self.top_below_m = self.top_below_m.min(look.top_below_m).max(self.top_m);
+        if self.front_known {
+            let Range { start, end } = LORRY_TOP_M;
+            let fresh = ((self.top_m - start) / (end - start)).clamp(0.0, 1.0);
+            self.lorry += LORRY * (fresh - self.lorry);
+        }
     }
 
     /// Greatest width of a car, or of a lorry, which is higher.
     fn widest_m(&self) -> f64 {
         const WIDEST_M: f64 = 2.1;
         const WIDEST_TALL_M: f64 = 2.75;
-        const TALL_M: f64 = 2.3;
-        if self.top_m > TALL_M {
+        if self.is_tall() {
             WIDEST_TALL_M
         } else {
             WIDEST_M
         }
+    }
+
+    /// Whether it is higher than a car.
+    pub(super) fn is_tall(&self) -> bool {
+        is_tall(self.top_m)
     }
 
     /// What is wider than any vehicle, or clearly wider than long, was taken for its own end.
@@ -225,6 +252,12 @@ impl Shape {
         self.yaw_variance =
             (self.yaw_variance + DRIFT * DRIFT * seconds).min(UNKNOWN_YAW_RAD * UNKNOWN_YAW_RAD);
     }
+}
+
+/// Whether what is so high is higher than a car.
+pub(super) fn is_tall(top_m: f64) -> bool {
+    const TALL_M: f64 = 2.3;
+    top_m > TALL_M
 }
 
 /// Nothing on the road is smaller.

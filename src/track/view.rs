@@ -113,6 +113,8 @@ impl View {
         const UPPER: f64 = 0.4;
         /// Share of the length that reaches out below a cabin to either end.
         const INSET: f64 = 0.1;
+        /// What is longer is a lorry or a bus, as long above as below.
+        const LONGEST_WITH_BONNET_M: f64 = 6.5;
         /// What half a step between columns adds for each metre of range.
         const EDGE_PER_M: f64 = 0.002;
         let expected = [
@@ -126,7 +128,7 @@ impl View {
             let (low, high) = (self.low_m[axis], self.high_m[axis]);
             let half_m = 0.5 * size_m[axis].max(high - low);
             let unsure_m = 0.5 * size_deviation_m[axis];
-            let is_inset = self.is_upper && axis == 0;
+            let is_inset = self.is_upper && axis == 0 && size_m[axis] < LONGEST_WITH_BONNET_M;
             let inset_m = if is_inset {
                 (INSET * size_m[axis]).min((half_m - 0.5 * (high - low)).max(0.0))
             } else {
@@ -214,5 +216,27 @@ mod tests {
         let (x_m, deviation_m) = centre_x_m(0.0, false);
         assert_eq!(x_m, centre_x_m(2.0, false).0);
         assert!(deviation_m < 0.3);
+    }
+
+    #[test]
+    fn what_is_seen_of_a_bus_above_the_belt_ends_where_the_bus_ends() {
+        // The upper part of a rear, 25 m away.
+        let scan = scan_of(1800, |column, layer| match column {
+            0..28 if (7..9).contains(&layer) => 2500,
+            _ => 0,
+        });
+        let spots = spots_of(&scan);
+        let look = Look {
+            is_upper: true,
+            ..Look::at(&spots, &scan, Vector2::zeros())
+        };
+        let view = View::of(&look, &spots, std::f64::consts::FRAC_PI_2);
+        let rear_m = |length_m: f64| {
+            let expected_m = Vector2::new(1.2, 25.0 + 0.5 * length_m);
+            let (centre_m, _) = view.centre([length_m, 2.5], [0.1; 2], expected_m, true);
+            centre_m.y - 0.5 * length_m
+        };
+        assert!((rear_m(12.0) - 25.0).abs() < 0.2, "{}", rear_m(12.0));
+        assert!(rear_m(4.3) < 24.8, "{}", rear_m(4.3));
     }
 }

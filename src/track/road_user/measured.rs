@@ -14,6 +14,13 @@ use crate::track::view::View;
 /// Speed from which a vehicle shows clearly where it goes.
 const FAST_MPS: f64 = 1.5;
 
+/// Probability of a road user below which something long is structure, of which motion says
+/// nothing.
+const SURELY_NONE: f64 = 0.05;
+const LONG_M: f64 = 2.5;
+/// How much higher than known something may be where a ray passes far away.
+const HIGHER_M: f64 = 0.4;
+
 impl Track {
     /// Takes a group in that is this object.
     pub(in crate::track) fn measure(
@@ -46,7 +53,9 @@ impl Track {
         self.range_m = look.range_m;
         self.floor_z_m = floor_z_m;
         self.roughness_m += 0.2 * (look.roughness_m - self.roughness_m);
-        self.goes_on += 0.2 * (look.goes_on - self.goes_on);
+        if !self.may_be_own(look.top_below_m) {
+            self.goes_on += 0.2 * (look.goes_on - self.goes_on);
+        }
         if let Some(fresh_m) = look.upper_m {
             let known_m = self.upper_m.get_or_insert(fresh_m);
             let gain = if fresh_m > *known_m { 0.3 } else { 0.05 };
@@ -59,6 +68,15 @@ impl Track {
         self.belief.learn(&Belief::of(&self.qualities()), 0.3);
     }
 
+    /// Whether what the next ray meets above the group may be more of the object: far away, a lorry
+    /// is a group for each layer.
+    fn may_be_own(&self, above_m: f64) -> bool {
+        /// Share of the width from which on it was seen from side to side.
+        const WHOLE: f64 = 0.9;
+        let is_lower = above_m < self.shape.top_below_m + HIGHER_M;
+        is_lower && self.is_moving_vehicle() && self.shape.whole[1] > WHOLE
+    }
+
     /// A size that changed moves the middle away from the sensor, not the edges that it sees.
     fn keep_near_edges(&mut self, look: &Look, before: [f64; 2], after: [f64; 2]) {
         let (sine, cosine) = libm::sincos(self.shape.yaw_rad);
@@ -66,7 +84,7 @@ impl Track {
         let along = sight.x * cosine + sight.y * sine;
         let across = sight.y * cosine - sight.x * sine;
         let away = |share: f64, axis: usize| {
-            let growth_m = (after[axis] - before[axis]).clamp(-0.5, 0.5);
+            let growth_m = (after[axis] - before[axis]).clamp(-0.8, 0.8);
             0.5 * growth_m * (3.0 * share).clamp(-1.0, 1.0)
         };
         let (u, v) = (away(along, 0), away(across, 1));
@@ -108,6 +126,12 @@ impl Track {
         let estimate = self.motion.estimate();
         let speed_mps = estimate.velocity_mps.norm();
         let is_moving = estimate.standing < 0.1 && speed_mps > MOVING_MPS;
+        // Of walls behind what is near, another piece is seen in every revolution.
+        if self.belief.road_user() < SURELY_NONE && self.shape.seen_m[0] > LONG_M {
+            (self.moves, self.travelled_m) = (false, 0.0);
+            self.born_m = estimate.position_m;
+            return;
+        }
         if is_moving && self.trails.shows_motion(self.shape.seen_m[0], look) {
             self.moves = true;
             let travelled_m = (estimate.position_m - self.born_m).norm();
@@ -142,5 +166,53 @@ impl Track {
             points: self.points,
             is_suspect: self.is_suspect,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::tests::scan_of;
+    use crate::track::tests::spots_of;
+
+    /// What is 4.2 m long, 1.4 m deep and 20 m away, goes on above in a share of its columns, was thought to
+    /// move, and was then seen for a second.
+    fn seen(goes_on: f64) -> Track {
+        let scan = scan_of(1800, |column, layer| match column {
+            0..60 if (5..8).contains(&layer) => 2000 + 70 * (layer as u16 - 5),
+            _ => 0,
+        });
+        let spots = spots_of(&scan);
+        let look = Look {
+            goes_on,
+            ..Look::at(&spots, &scan, Vector2::zeros())
+        };
+        let (mut outline, mut end) = (vec![], scan.time());
+        let mut track = Track::new(0, false, &spots, &look, end, 0.0, &mut outline);
+        (track.moves, track.travelled_m) = (true, 20.0);
+        for _ in 0..10 {
+            end = end + Span::from_seconds(0.1);
+            track.measure(&spots, &look, end, 0.0, &mut outline);
+        }
+        track
+    }
+
+    #[test]
+    fn a_wall_does_not_move_whatever_the_piece_of_it_that_is_seen_does() {
+        assert!(seen(0.0).moves);
+        let wall = seen(1.0);
+        assert!(wall.belief.road_user() < SURELY_NONE);
+        assert!(!wall.moves && wall.travelled_m == 0.0);
+    }
+
+    #[test]
+    fn what_is_known_to_be_higher_may_go_on_above() {
+        let mut lorry = seen(0.0);
+        lorry.shape.front_known = true;
+        (lorry.shape.top_below_m, lorry.shape.whole) = (3.2, [0.0, 0.95]);
+        assert!(lorry.is_moving_vehicle());
+        assert!(lorry.may_be_own(2.4) && !lorry.may_be_own(4.0));
+        lorry.shape.whole = [0.0; 2];
+        assert!(!lorry.may_be_own(2.4));
     }
 }

@@ -14,7 +14,7 @@ use super::class::Belief;
 use super::existence::Existence;
 use super::look::Look;
 use super::motion::Motion;
-use super::shape::Shape;
+use super::shape::{Shape, is_tall};
 use super::sight::Sight;
 use super::spots::Spot;
 use super::trail::Trails;
@@ -27,6 +27,9 @@ use reunion::Parting;
 const BIRTH_MPS: f64 = 6.0;
 /// Noise of a box's middle beside that of its edges, because its shape is not a box.
 const MIDDLE_M: f64 = 0.08;
+
+/// Length of the longest lorries with their trailers (Directive 96/53/EC).
+const LONGEST_M: f64 = 18.75;
 
 /// Returns below which an object may be no cluster in the next revolution.
 const SPARSE: usize = 16;
@@ -207,10 +210,14 @@ impl Track {
         self.existence.odds()
     }
 
-    /// Longest extent that more of the same object may have.
-    pub(super) fn most_m(&self) -> [f64; 2] {
+    /// Longest extent that more of the same object may have, if that is so high.
+    pub(super) fn most_m(&self, top_m: f64) -> [f64; 2] {
         let [length_m, width_m] = self.shape.size_m(self.belief.vehicle());
         let growth_m = if self.is_confirmed() { 0.6 } else { 2.0 };
+        if self.is_moving_vehicle() && self.shape.is_tall() && is_tall(top_m) {
+            let askew_m = LONGEST_M * libm::sqrt(self.shape.yaw_variance);
+            return [LONGEST_M, width_m + 0.4 + askew_m.min(1.0)];
+        }
         [length_m + growth_m, width_m + 0.4]
     }
 
@@ -237,7 +244,7 @@ impl Track {
             return f64::MAX;
         };
         let squared = (off.transpose() * inverse * off)[0];
-        let most = self.most_m();
+        let most = self.most_m(look.top_m);
         let extent = view.extent_m();
         let excess_m = (extent[0] - most[0]).max(extent[1] - most[1]).max(0.0);
         let vanished = if self.is_confirmed() {
