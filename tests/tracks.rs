@@ -199,3 +199,34 @@ fn is_within(user: &TrueObject, object: &Object) -> bool {
     let (along_m, across_m) = (x * cosine + y * sine, y * cosine - x * sine);
     2.0 * along_m.abs() < user.size_m[0] && 2.0 * across_m.abs() < user.size_m[1]
 }
+
+#[test]
+fn who_drives_ahead_over_the_seam_of_the_sweep_is_one_object_under_one_id() {
+    let mut simulation = Simulation::new(scenario::find("hill").unwrap(), 12);
+    let mut pipeline = pipeline();
+    let (mut ahead, mut ids) = (None, BTreeMap::<Option<u32>, u32>::new());
+    let mut doubled = 0;
+    for revolution in 0..100 {
+        let mut frames = vec![];
+        let truth = simulation.revolve(&mut frames);
+        feed(&mut pipeline, &frames, true);
+        let off_m = |user: &TrueObject| (user.centre_m[0]).hypot(user.centre_m[1] - 17.0);
+        let nearest = truth
+            .objects
+            .iter()
+            .min_by(|a, b| off_m(a).total_cmp(&off_m(b)));
+        let id = *ahead.get_or_insert(nearest.unwrap().id);
+        let car = truth.objects.iter().find(|user| user.id == id).unwrap();
+        if revolution >= 15 {
+            let objects = pipeline.objects();
+            *ids.entry(id_of(car, objects, in_frame)).or_default() += 1;
+            let within = objects
+                .iter()
+                .filter(|object| is_within(car, object))
+                .count();
+            doubled += u32::from(within > 1);
+        }
+    }
+    println!("{ids:?}, doubled {doubled} times");
+    assert!(ids.len() == 1 && !ids.contains_key(&None) && doubled == 0);
+}

@@ -132,8 +132,11 @@ impl Grouping {
             for (placed, track) in placed.iter().zip(self.claims.owners()) {
                 let group = track.map(|track| track as u32).or(is_whole.then_some(own));
                 if let Some(group) = group.filter(|_| !track.is_some_and(rests)) {
-                    self.spots
-                        .push(Spot::new(scene, placed.point, placed.at_m, group));
+                    let mut spot = Spot::new(scene, placed.point, placed.at_m, group);
+                    if placed.is_brought {
+                        spot.age_s -= scene.scan.duration_s() as f32;
+                    }
+                    self.spots.push(spot);
                 }
             }
             let spots = &mut self.spots[begin..];

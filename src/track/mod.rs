@@ -43,6 +43,8 @@ mod rectangle;
 
 mod road_user;
 
+mod seam;
+
 mod shape;
 
 mod sight;

@@ -1,7 +1,7 @@
 //! The returns of one cluster, placed, coordinate by coordinate.
 
-use super::Scene;
 use super::look::same_above;
+use super::{Scene, seam};
 use crate::cloud::MAX_LAYERS;
 use crate::float::{bounds_of, greatest, least};
 
@@ -17,6 +17,8 @@ pub(super) struct Placing {
     above_m: Vec<f32>,
     range_m: Vec<f32>,
     point: Vec<u32>,
+    /// So many of the first ones are placed as if they were seen at the end.
+    brought: usize,
     /// Where each column looks.
     columns: Vec<Bearing>,
     /// Cosine of each layer's elevation.
@@ -40,6 +42,8 @@ pub(super) struct Placed {
     pub(super) above_m: f32,
     /// Its place in the scan.
     pub(super) point: u32,
+    /// Whether it is placed where it would be seen at the end.
+    pub(super) is_brought: bool,
 }
 
 /// The box that holds some returns.
@@ -120,6 +124,28 @@ impl Placing {
             *other.0 = heights_m[number];
             *other.1 = range_m;
         }
+        self.brought = 0;
+        if let Some(step_m) = seam::step_m(points, scene) {
+            self.bring_older(step_m, scene);
+        }
+    }
+
+    /// Places what is on the older side of the seam as if it was seen at the end, so much farther
+    /// away.
+    fn bring_older(&mut self, step_m: f32, scene: &Scene<'_>) {
+        let (scan, Some(end)) = (scene.scan, scene.placements.last()) else {
+            return;
+        };
+        let is_older = |point: &&u32| scan.column(**point as usize) < scan.columns() / 2;
+        let older = self.point.iter().take_while(is_older);
+        let origin_m = self.columns[scan.columns() - 1].origin_m;
+        for (place, point) in older.map(|point| *point as usize).enumerate() {
+            let direction = end.turned(scan.direction(scan.column(point)).map(f64::from));
+            let distance_m = (self.range_m[place] + step_m) * self.cosines[scan.layer(point)];
+            self.x_m[place] = origin_m[0] + distance_m * direction[0] as f32;
+            self.y_m[place] = origin_m[1] + distance_m * direction[1] as f32;
+            self.brought = place + 1;
+        }
     }
 
     /// Height above the ground to which it goes on in the returns directly above its own ones, be
@@ -151,10 +177,12 @@ impl Placing {
         let [x_m, y_m] = self.at_m();
         let places = x_m.iter().zip(y_m);
         let others = self.above_m().iter().zip(&self.point);
-        places.zip(others).map(|((x, y), (above_m, point))| Placed {
+        let all = places.zip(others).enumerate();
+        all.map(|(place, ((x, y), (above_m, point)))| Placed {
             at_m: [*x, *y],
             above_m: *above_m,
             point: *point,
+            is_brought: place < self.brought,
         })
     }
 
