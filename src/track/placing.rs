@@ -136,15 +136,15 @@ impl Placing {
         let (scan, Some(end)) = (scene.scan, scene.placements.last()) else {
             return;
         };
-        let is_older = |point: &&u32| scan.column(**point as usize) < scan.columns() / 2;
-        let older = self.point.iter().take_while(is_older);
+        let is_older = |point: &u32| scan.column(*point as usize) < scan.columns() / 2;
+        self.brought = self.point.partition_point(is_older);
         let origin_m = self.columns[scan.columns() - 1].origin_m;
-        for (place, point) in older.map(|point| *point as usize).enumerate() {
+        for place in 0..self.brought {
+            let point = self.point[place] as usize;
             let direction = end.turned(scan.direction(scan.column(point)).map(f64::from));
             let distance_m = (self.range_m[place] + step_m) * self.cosines[scan.layer(point)];
             self.x_m[place] = origin_m[0] + distance_m * direction[0] as f32;
             self.y_m[place] = origin_m[1] + distance_m * direction[1] as f32;
-            self.brought = place + 1;
         }
     }
 

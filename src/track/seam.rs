@@ -4,6 +4,8 @@
 //! apart: a vehicle straight ahead is seen in two halves, of which one has driven on by metres
 //! where the sensor follows it, though both are as far away as each other.
 
+use nalgebra::Vector2;
+
 use super::Scene;
 use crate::cloud::{MAX_LAYERS, Scan};
 
@@ -24,10 +26,9 @@ pub(super) fn step_m(points: &[u32], scene: &Scene<'_>) -> Option<f32> {
         return None;
     }
     let (begin, end) = (scene.placements.first()?, scene.placements.last()?);
-    let ahead = end.turned(scan.direction(0).map(f64::from));
-    let [from_m, to_m] = [begin, end].map(|placement| placement.origin_m());
-    let advance_m = [0, 1].map(|axis: usize| (to_m[axis] - from_m[axis]) * ahead[axis]);
-    let advance_m = (advance_m[0] + advance_m[1]) as f32;
+    let ahead = Vector2::from(end.turned(scan.direction(0).map(f64::from)));
+    let [from_m, to_m] = [begin, end].map(|placement| Vector2::from(placement.origin_m()));
+    let advance_m = (to_m - from_m).dot(&ahead) as f32;
     if advance_m < LEAST_ADVANCE_M {
         return None;
     }

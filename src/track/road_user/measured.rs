@@ -14,9 +14,9 @@ use crate::track::view::View;
 /// Speed from which a vehicle shows clearly where it goes.
 const FAST_MPS: f64 = 1.5;
 
-/// Probability of a road user below which something long is structure, of which motion says
-/// nothing.
+/// Probability of a road user below which something is structure for sure...
 const SURELY_NONE: f64 = 0.05;
+/// ...of which motion says nothing, if it is as long as this: shorter ones are seen whole.
 const LONG_M: f64 = 2.5;
 /// How much higher than known something may be where a ray passes far away.
 const HIGHER_M: f64 = 0.4;
@@ -124,14 +124,14 @@ impl Track {
     /// no change of view explains it.
     fn note_motion(&mut self, look: &Look) {
         let estimate = self.motion.estimate();
-        let speed_mps = estimate.velocity_mps.norm();
-        let is_moving = estimate.standing < 0.1 && speed_mps > MOVING_MPS;
         // Of walls behind what is near, another piece is seen in every revolution.
         if self.belief.road_user() < SURELY_NONE && self.shape.seen_m[0] > LONG_M {
             (self.moves, self.travelled_m) = (false, 0.0);
             self.born_m = estimate.position_m;
             return;
         }
+        let speed_mps = estimate.velocity_mps.norm();
+        let is_moving = estimate.standing < 0.1 && speed_mps > MOVING_MPS;
         if is_moving && self.trails.shows_motion(self.shape.seen_m[0], look) {
             self.moves = true;
             let travelled_m = (estimate.position_m - self.born_m).norm();
@@ -175,8 +175,8 @@ mod tests {
     use crate::cloud::tests::scan_of;
     use crate::track::tests::spots_of;
 
-    /// What is 4.2 m long, 1.4 m deep and 20 m away, goes on above in a share of its columns, was thought to
-    /// move, and was then seen for a second.
+    /// What is 4.2 m long, 1.4 m deep and 20 m away, goes on above in a share of its columns, was
+    /// thought to move, and was then seen for a second.
     fn seen(goes_on: f64) -> Track {
         let scan = scan_of(1800, |column, layer| match column {
             0..60 if (5..8).contains(&layer) => 2000 + 70 * (layer as u16 - 5),
