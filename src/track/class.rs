@@ -74,6 +74,8 @@ pub(super) struct Qualities {
     pub(super) short_m: f64,
     /// Length, once it was seen from end to end.
     pub(super) whole_m: Option<f64>,
+    /// Width, once it was seen from side to side.
+    pub(super) wide_m: Option<f64>,
     /// Extent across the direction in which it moves, once that is known.
     pub(super) across_m: Option<f64>,
     /// Greatest extent of what is higher than a bonnet or a handlebar, if any of it was seen.
@@ -122,6 +124,7 @@ struct Profile {
     long_m: Within,
     short_m: Within,
     whole_m: Within,
+    wide_m: Within,
     across_m: Within,
     upper_m: Within,
     top_m: Within,
@@ -137,6 +140,7 @@ const PROFILES: [Profile; 4] = [
         long_m: Within(1.35, 5.3, 0.2),
         short_m: Within(0.1, 2.1, 0.15),
         whole_m: Within(3.1, 5.3, 0.3),
+        wide_m: Within(1.2, 2.15, 0.15),
         across_m: Within(0.1, 2.15, 0.15),
         upper_m: Within(0.95, 5.3, 0.12),
         top_m: Within(1.25, 2.1, 0.12),
@@ -147,6 +151,7 @@ const PROFILES: [Profile; 4] = [
         long_m: Within(0.95, 1.95, 0.14),
         short_m: Within(0.1, 0.85, 0.12),
         whole_m: Within(0.3, 1.95, 0.15),
+        wide_m: Within(0.1, 0.95, 0.12),
         across_m: Within(0.1, 0.85, 0.12),
         upper_m: Within(0.1, 0.95, 0.12),
         top_m: Within(1.4, 1.95, 0.12),
@@ -157,6 +162,7 @@ const PROFILES: [Profile; 4] = [
         long_m: Within(0.2, 0.85, 0.09),
         short_m: Within(0.05, 0.7, 0.1),
         whole_m: Within(0.1, 0.95, 0.12),
+        wide_m: Within(0.1, 0.95, 0.12),
         across_m: Within(0.1, 0.85, 0.1),
         upper_m: Within(0.1, 0.85, 0.1),
         top_m: Within(1.3, 1.95, 0.12),
@@ -167,6 +173,7 @@ const PROFILES: [Profile; 4] = [
         long_m: Within(5.0, 15.0, 1.1),
         short_m: Within(0.1, 2.8, 0.2),
         whole_m: Within(5.0, 18.0, 0.5),
+        wide_m: Within(1.5, 2.8, 0.2),
         across_m: Within(0.1, 2.8, 0.2),
         upper_m: Within(1.3, 15.0, 0.2),
         top_m: Within(2.3, 4.0, 0.12),
@@ -260,6 +267,7 @@ impl Belief {
                 + long_m.log_between(qualities.long_m, qualities.long_m + slack_m)
                 + short
                 + known(&profile.whole_m, qualities.whole_m)
+                + known(&profile.wide_m, qualities.wide_m)
                 + known(&profile.across_m, qualities.across_m)
                 + known(
                     &profile.upper_m,
@@ -373,6 +381,7 @@ mod tests {
         long_m: 4.2,
         short_m: 1.6,
         whole_m: None,
+        wide_m: None,
         across_m: None,
         upper_m: Some(1.4),
         top_m: 1.4,

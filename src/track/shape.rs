@@ -118,6 +118,8 @@ impl Shape {
         const CLEAR_RANGE_M: f64 = 25.0;
         /// What is hidden is not reckoned with at once.
         const LORRY: f64 = 0.2;
+        /// Of what shows so much of its length, the end shows, too.
+        const LONG_M: f64 = 1.5;
         // Seen askew, a box is longer and wider than the object.
         let askew_rad = libm::sqrt(self.yaw_variance).min(0.5);
         let extent = view.extent_m();
@@ -130,7 +132,8 @@ impl Shape {
                 SHRINK
             };
             let is_too_wide = axis == 1 && self.seen_m[1] > self.widest_m();
-            let gain = if is_too_wide && fresh_m < self.seen_m[1] {
+            let is_thin = axis == 1 && view.is_whole()[1] && extent[0] > LONG_M;
+            let gain = if (is_too_wide || is_thin) && fresh_m < self.seen_m[1] {
                 CORRECT
             } else {
                 gain

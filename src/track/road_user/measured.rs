@@ -162,6 +162,7 @@ impl Track {
             // The end of what is seen of a wall moves, too, but not by its length.
             moved: self.moves && self.travelled_m > (2.0 * length_m).max(1.2),
             whole_m: (self.shape.whole[0] > 0.3).then_some(length_m),
+            wide_m: (self.shape.whole[1] > 0.5).then_some(width_m),
             range_m: self.range_m,
             points: self.points,
             is_suspect: self.is_suspect,
