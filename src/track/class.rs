@@ -232,11 +232,12 @@ impl Belief {
                 0.0
             };
             // A bicycle from behind is as narrow as a person, and limbs and spokes are rough.
-            let long_m = if ROAD_USERS[number] == Class::Cyclist && qualities.moved {
-                Within(0.4, profile.long_m.1, profile.long_m.2)
-            } else {
-                Within(profile.long_m.0, profile.long_m.1, profile.long_m.2)
+            let shortest_m = match ROAD_USERS[number] {
+                Class::Cyclist if qualities.moved => 0.4,
+                Class::LargeVehicle if qualities.moved => 1.7,
+                _ => profile.long_m.0,
             };
+            let long_m = Within(shortest_m, profile.long_m.1, profile.long_m.2);
             // What goes on above the highest layer is rather a house than a vehicle.
             let endless = if qualities.top_below_m == f64::MAX {
                 ENDLESS_LOG
@@ -257,7 +258,10 @@ impl Belief {
             } else {
                 &FLAT_M
             };
-            let is_flat = !is_thin && qualities.points >= FEW && qualities.short_m < deep_m.0;
+            let is_flat = !is_thin
+                && !qualities.moved
+                && qualities.points >= FEW
+                && qualities.short_m < deep_m.0;
             let short = if is_flat {
                 deep_m.log(qualities.short_m)
             } else {

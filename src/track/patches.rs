@@ -100,6 +100,10 @@ const ABOVE_CUT_M: f32 = 0.8;
 const ABOVE_CUT_PER_M: f32 = 0.07;
 /// Share of a part's cells above which there is more, from which on it is a wall or a trunk.
 const GOES_ON: f64 = 0.5;
+/// Height of vans.
+const VAN_TOP_M: f32 = 3.0;
+/// Difference of ranges within which what is above the cut goes on from what is below.
+const SAME_M: f32 = 0.8;
 /// Smaller clusters are not divided.
 const SMALLEST_DIVIDED_M: f64 = 1.0;
 
@@ -174,7 +178,7 @@ impl Placer {
         }
         self.floor.join();
         self.count_cells(is_too_tall, whole.top_m);
-        self.assign();
+        self.assign(whole.top_m);
         self.sort(is_too_tall);
     }
 
@@ -211,17 +215,32 @@ impl Placer {
     }
 
     /// Finds the part of every return, and where each part's returns begin.
-    fn assign(&mut self) {
+    fn assign(&mut self, top_m: f32) {
         self.floor.name_by_parts();
         self.part_of.clear();
+        let ranges_m = self.cluster.range_m();
         let own = self.cluster.above_m().iter().zip(&self.places);
-        self.part_of.extend(own.map(|(above_m, place)| {
-            let number = self.floor.name(*place);
-            let part = &mut self.parts[number as usize];
-            let is_own = *above_m <= part.cut_m;
-            part.place += usize::from(is_own);
-            if is_own { number } else { NO_PART }
-        }));
+        let own = own.zip(self.cluster.points().iter().zip(ranges_m));
+        // The last return: its point, its part, and its range.
+        let mut below = (u32::MAX, NO_PART, 0.0);
+        self.part_of
+            .extend(own.map(|((above_m, place), (point, range_m))| {
+                let (point_below, part_below, range_below_m) = below;
+                let number = self.floor.name(*place);
+                let goes_on = top_m < VAN_TOP_M
+                    && point_below.wrapping_add(1) == *point
+                    && (range_m - range_below_m).abs() < SAME_M;
+                let part = if *above_m <= self.parts[number as usize].cut_m {
+                    number
+                } else if goes_on {
+                    part_below
+                } else {
+                    NO_PART
+                };
+                self.parts[part as usize].place += usize::from(part != NO_PART);
+                below = (*point, part, *range_m);
+                part
+            }));
         let mut next = self.placed.len();
         for part in &mut self.parts {
             next += std::mem::replace(&mut part.place, next);

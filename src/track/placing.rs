@@ -162,6 +162,11 @@ impl Placing {
         [&self.x_m[..self.count], &self.y_m[..self.count]]
     }
 
+    /// Their places in the scan.
+    pub(super) fn points(&self) -> &[u32] {
+        &self.point
+    }
+
     /// Their heights above the ground.
     pub(super) fn above_m(&self) -> &[f32] {
         &self.above_m[..self.count]
