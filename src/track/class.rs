@@ -225,7 +225,12 @@ impl Belief {
             let profile = &PROFILES[number];
             let is_thin = matches!(ROAD_USERS[number], Class::Cyclist | Class::Pedestrian);
             let speed = if qualities.moved {
-                profile.speed_mps.log(qualities.speed_mps)
+                let own = profile.speed_mps.log(qualities.speed_mps);
+                if ROAD_USERS[number] == Class::Cyclist {
+                    own.max(MOTOR_LOG)
+                } else {
+                    own
+                }
             } else if ROAD_USERS[number] == Class::Cyclist {
                 STANDING_CYCLIST_LOG
             } else {
@@ -374,6 +379,8 @@ const UPRIGHT_LOG: f64 = 0.6;
 const MANY_FOR_A_PERSON: usize = 20;
 /// Of a road user that reaches out of the sensor's view.
 const ENDLESS_LOG: f64 = -1.5;
+/// Of a two-wheeler that is too fast for a bicycle: it has a motor.
+const MOTOR_LOG: f64 = -2.0;
 /// Bicycles that stand have mostly no rider.
 const STANDING_CYCLIST_LOG: f64 = -1.0;
 
