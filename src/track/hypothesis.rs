@@ -31,6 +31,8 @@ const TURNING_RADPS2: f64 = 0.7;
 /// Velocity that a standing object has at most, m/s, and rate of turn of a straight one, rad/s.
 const STILL_MPS: f64 = 0.02;
 const STRAIGHT_RADPS: f64 = 0.01;
+/// Standard deviation of the speed of what turns.
+const TURNING_MPS: f64 = 6.0;
 /// Of a rate of turn that was not measured yet: a car in a small roundabout has 0.7.
 const UNKNOWN_RADPS: f64 = 0.4;
 /// Tighter turns are noise.
@@ -60,7 +62,7 @@ impl Hypothesis {
         let (speed, turn) = match model {
             Model::Standing => (STILL_MPS, STRAIGHT_RADPS),
             Model::Straight => (speed_deviation_mps, STRAIGHT_RADPS),
-            Model::Turning => (speed_deviation_mps, UNKNOWN_RADPS),
+            Model::Turning => (speed_deviation_mps.min(TURNING_MPS), UNKNOWN_RADPS),
         };
         covariance[(2, 2)] = speed * speed;
         covariance[(3, 3)] = speed * speed;

@@ -126,7 +126,12 @@ impl Track {
         let (centre_m, noise) = track.centre(&view, look.middle_m);
         track.trails.begin(centre_m);
         track.born_m = centre_m;
-        track.motion = Motion::new(centre_m, noise, BIRTH_MPS);
+        let birth_mps = if track.belief.vehicle() > 0.5 {
+            14.0
+        } else {
+            BIRTH_MPS
+        };
+        track.motion = Motion::new(centre_m, noise, birth_mps);
         track.parted = Parting::of(&track.motion.estimate(), look.points, time);
         track
     }
