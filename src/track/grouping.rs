@@ -116,6 +116,13 @@ impl Grouping {
             if self.near.is_empty() && !is_whole {
                 continue;
             }
+            let top_m = f64::from(patch.bounds.top_m);
+            let is_lorry =
+                |track: &usize| tracks[*track].is_published && tracks[*track].may_be_lorry(top_m);
+            if self.near.iter().any(is_lorry) {
+                // Pieces of it are no objects.
+                self.near.retain(|track| tracks[*track].is_published);
+            }
             let begin = self.spots.len();
             let placed = self.placer.placed(patch);
             self.claims
@@ -140,7 +147,6 @@ impl Grouping {
                 }
             }
             let spots = &mut self.spots[begin..];
-            let top_m = f64::from(patch.bounds.top_m);
             if let Some(track) = owner.filter(|track| fits(spots, top_m, &tracks[*track])) {
                 for spot in spots.iter_mut() {
                     spot.group = track as u32;

@@ -219,11 +219,16 @@ impl Track {
     pub(super) fn most_m(&self, top_m: f64) -> [f64; 2] {
         let [length_m, width_m] = self.shape.size_m(self.belief.vehicle());
         let growth_m = if self.is_confirmed() { 0.6 } else { 2.0 };
-        if self.is_moving_vehicle() && self.shape.is_tall() && is_tall(top_m) {
+        if self.may_be_lorry(top_m) {
             let askew_m = LONGEST_M * libm::sqrt(self.shape.yaw_variance);
             return [LONGEST_M, width_m + 0.4 + askew_m.min(1.0)];
         }
         [length_m + growth_m, width_m + 0.4]
+    }
+
+    /// Whether it and something so high may both be parts of a lorry.
+    pub(super) fn may_be_lorry(&self, top_m: f64) -> bool {
+        self.is_moving_vehicle() && self.shape.is_tall() && is_tall(top_m)
     }
 
     fn centre(&self, view: &View, expected_m: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
