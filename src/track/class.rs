@@ -254,7 +254,8 @@ impl Belief {
             let is_upright = ROAD_USERS[number] == Class::Pedestrian
                 && qualities.points >= MANY_FOR_A_PERSON
                 && profile.top_m.log_between(qualities.top_m, qualities.top_m) == 0.0
-                && qualities.top_below_m < profile.top_m.1 + 0.1;
+                && qualities.long_m > 0.35
+                && qualities.top_below_m < profile.top_m.1 + 0.65;
             let upright = if is_upright { UPRIGHT_LOG } else { 0.0 };
             let surface = if is_thin { 0.25 * smooth } else { smooth };
             // A wall is flat, a vehicle has bumpers, wheels and screens that do not line up.
@@ -376,7 +377,7 @@ const DEEP_M: Within = Within(0.6, 3.0, 0.13);
 const MANY: usize = 60;
 /// What speaks for a person where the height is one's, and the returns that show it.
 const UPRIGHT_LOG: f64 = 0.6;
-const MANY_FOR_A_PERSON: usize = 20;
+const MANY_FOR_A_PERSON: usize = 10;
 /// Of a road user that reaches out of the sensor's view.
 const ENDLESS_LOG: f64 = -1.5;
 /// Of a two-wheeler that is too fast for a bicycle: it has a motor.
