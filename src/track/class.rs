@@ -250,6 +250,20 @@ impl Belief {
                 0.0
             };
             let ends = ENDS.log(qualities.goes_on);
+            // People side by side are as wide as they are many.
+            let is_group = ROAD_USERS[number] == Class::Pedestrian
+                && qualities.moved
+                && qualities.long_m > profile.long_m.1
+                && qualities.short_m < GROUP_M.1;
+            let group_m = |own: &Within| {
+                if is_group {
+                    Within(own.0, GROUP_M.0, own.2)
+                } else {
+                    Within(own.0, own.1, own.2)
+                }
+            };
+            let long_m = if is_group { group_m(&long_m) } else { long_m };
+            let group = if is_group { GROUP_LOG } else { 0.0 };
             // Posts as high as a person are rarer than posts that are lower or higher.
             let is_upright = ROAD_USERS[number] == Class::Pedestrian
                 && qualities.points >= MANY_FOR_A_PERSON
@@ -276,11 +290,12 @@ impl Belief {
             let log = profile.log_prior
                 + long_m.log_between(qualities.long_m, qualities.long_m + slack_m)
                 + short
-                + known(&profile.whole_m, qualities.whole_m)
-                + known(&profile.wide_m, qualities.wide_m)
-                + known(&profile.across_m, qualities.across_m)
+                + group
+                + known(&group_m(&profile.whole_m), qualities.whole_m)
+                + known(&group_m(&profile.wide_m), qualities.wide_m)
+                + known(&group_m(&profile.across_m), qualities.across_m)
                 + known(
-                    &profile.upper_m,
+                    &group_m(&profile.upper_m),
                     qualities.upper_m.map(|seen_m| seen_m + slack_m),
                 )
                 + profile
@@ -380,6 +395,9 @@ const UPRIGHT_LOG: f64 = 0.6;
 const MANY_FOR_A_PERSON: usize = 10;
 /// Of a road user that reaches out of the sensor's view.
 const ENDLESS_LOG: f64 = -1.5;
+/// Greatest width of a group of people who walk side by side, and its depth.
+const GROUP_M: (f64, f64) = (2.3, 0.8);
+const GROUP_LOG: f64 = -1.0;
 /// Of a two-wheeler that is too fast for a bicycle: it has a motor.
 const MOTOR_LOG: f64 = -2.0;
 /// Bicycles that stand have mostly no rider.

@@ -35,6 +35,8 @@ pub(super) struct Grouping {
     free: Vec<(usize, [Vector2<f64>; 2])>,
     /// The group that each one joins.
     target: Vec<usize>,
+    /// Group numbers of people who are told apart.
+    several: Vec<u32>,
     /// Group numbers of what was cut off structure, ascending.
     suspects: Vec<u32>,
 }
@@ -104,6 +106,7 @@ impl Grouping {
         let origin_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
         self.forecasts.take(tracks, origin_m);
         self.suspects.clear();
+        self.several.clear();
         self.spots.clear();
         for (number, patch) in self.placer.patches().iter().enumerate() {
             let own = (tracks.len() + number) as u32;
@@ -113,6 +116,19 @@ impl Grouping {
             let is_whole = patch.can_be_road_user(parameters);
             self.near.clear();
             self.near.extend(self.forecasts.near(patch));
+            if patch.others != [0; 2] {
+                let forecasts = &self.forecasts;
+                let patches = self.placer.patches();
+                self.near.retain(|track| {
+                    tracks[*track].is_vehicle() || forecasts.is_nearest(*track, patches, number)
+                });
+                self.several.push(own);
+                let people = self
+                    .near
+                    .iter()
+                    .filter(|track| !tracks[**track].is_vehicle());
+                self.several.extend(people.map(|track| *track as u32));
+            }
             if self.near.is_empty() && !is_whole {
                 continue;
             }
@@ -206,6 +222,7 @@ impl Grouping {
             if spots.len() < FEWEST_RETURNS && claimed_by.is_none() {
                 continue;
             }
+            let is_one_of_several = self.several.contains(&number);
             let look = match own {
                 [
                     Stretch {
@@ -213,7 +230,10 @@ impl Grouping {
                         ..
                     },
                 ] => self.former[*place].look,
-                _ => Look::at(spots, scene.scan, sensor_m),
+                _ => Look {
+                    is_one_of_several,
+                    ..Look::at(spots, scene.scan, sensor_m)
+                },
             };
             self.groups.push(Group {
                 number,
@@ -234,7 +254,7 @@ impl Grouping {
         );
         free.clear();
         for (number, group) in self.groups.iter().enumerate() {
-            if group.claimed_by.is_none() {
+            if group.claimed_by.is_none() && !group.look.is_one_of_several {
                 free.push((number, self.bounds(group)));
             }
         }

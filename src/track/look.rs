@@ -32,6 +32,8 @@ pub(super) struct Look {
     pub(super) ends_m: [Vector2<f64>; 2],
     /// Something nearer hides what is to the left or to the right.
     pub(super) is_cut: [bool; 2],
+    /// It is one of several people.
+    pub(super) is_one_of_several: bool,
     /// Where the sensor is at the end.
     pub(super) sensor_m: Vector2<f64>,
 }
@@ -88,6 +90,7 @@ impl Look {
             is_upper: f64::from(low) < (LOW_SHARE * count).max(2.0),
             ends_m,
             is_cut: cuts(spots, ends, scan),
+            is_one_of_several: false,
             sensor_m,
         }
     }

@@ -38,6 +38,8 @@ mod objects;
 
 mod patches;
 
+mod people;
+
 mod placing;
 
 mod rectangle;

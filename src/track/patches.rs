@@ -2,7 +2,7 @@
 
 use super::floor::Floor;
 use super::placing::{Bounds, Placed, Placing};
-use super::{Scene, TrackParameters};
+use super::{Scene, TrackParameters, people};
 use crate::cluster::Clusters;
 use crate::float::{bounds_of, greatest};
 
@@ -18,6 +18,8 @@ pub(super) struct Patch {
     goes_on: bool,
     /// It was cut off something that is no road user, and may be a piece of that.
     pub(super) is_suspect: bool,
+    /// One of several people: their patches follow each other, so many before this one and after.
+    pub(super) others: [usize; 2],
 }
 
 impl Patch {
@@ -54,6 +56,9 @@ pub(super) struct Placer {
     parts: Vec<Part>,
     /// The part of each return.
     part_of: Vec<u32>,
+    /// The patches before people were told apart, and where they are.
+    former: Vec<Patch>,
+    cuts: Vec<usize>,
 }
 
 /// Cells of a cluster that touch.
@@ -136,6 +141,7 @@ impl Placer {
                 bounds,
                 goes_on: false,
                 is_suspect: false,
+                others: [0; 2],
             };
             if whole.diagonal_m() < SMALLEST_DIVIDED_M {
                 self.placed.extend(self.cluster.iter());
@@ -148,6 +154,34 @@ impl Placer {
                 for patch in &mut self.patches[first..] {
                     patch.is_suspect = is_structure;
                 }
+            }
+        }
+        self.tell_people_apart(scene);
+    }
+
+    /// Makes a patch of each of several people that are one.
+    fn tell_people_apart(&mut self, scene: &Scene<'_>) {
+        std::mem::swap(&mut self.patches, &mut self.former);
+        self.patches.clear();
+        for patch in &self.former {
+            let placed = &self.placed[patch.begin..patch.end];
+            people::cuts(placed, &patch.bounds, scene.scan, &mut self.cuts);
+            if self.cuts.is_empty() || patch.goes_on {
+                self.patches.push(*patch);
+                continue;
+            }
+            let mut begin = patch.begin;
+            let count = self.cuts.len();
+            let ends = self.cuts.iter().map(|cut| patch.begin + cut);
+            for (number, end) in ends.chain([patch.end]).enumerate() {
+                self.patches.push(Patch {
+                    begin,
+                    end,
+                    bounds: Bounds::of(&self.placed[begin..end]),
+                    others: [number, count - number],
+                    ..*patch
+                });
+                begin = end;
             }
         }
     }
@@ -267,6 +301,7 @@ impl Placer {
                     bounds: Bounds::of(&self.placed[begin..part.place]),
                     goes_on: is_too_tall && part.goes_on(),
                     is_suspect: false,
+                    others: [0; 2],
                 });
             }
         }

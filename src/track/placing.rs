@@ -58,6 +58,11 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
+    /// Its middle from above.
+    pub(super) fn middle_m(&self) -> [f32; 2] {
+        [0, 1].map(|axis| 0.5 * (self.low_m[axis] + self.high_m[axis]))
+    }
+
     /// The box that holds some returns.
     pub(super) fn of(returns: &[Placed]) -> Self {
         let mut bounds = Self {

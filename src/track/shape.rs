@@ -133,13 +133,15 @@ impl Shape {
             };
             let is_too_wide = axis == 1 && self.seen_m[1] > self.widest_m();
             let is_thin = axis == 1 && view.is_whole()[1] && extent[0] > LONG_M;
-            let gain = if (is_too_wide || is_thin) && fresh_m < self.seen_m[1] {
+            let gain = if look.is_one_of_several {
+                1.0
+            } else if (is_too_wide || is_thin) && fresh_m < self.seen_m[1] {
                 CORRECT
             } else {
                 gain
             };
             let is_whole = view.is_whole()[axis];
-            if fresh_m > self.seen_m[axis] || is_whole || is_too_wide {
+            if fresh_m > self.seen_m[axis] || is_whole || is_too_wide || look.is_one_of_several {
                 self.seen_m[axis] += gain * (fresh_m - self.seen_m[axis]);
             }
             let clear = (CLEAR_RANGE_M / look.range_m.max(1.0)).min(1.0);

@@ -202,6 +202,11 @@ impl Track {
         self.moves && self.shape.front_known && self.belief.vehicle() > 0.5
     }
 
+    /// Whether it is rather a vehicle than anything else on the road.
+    pub(super) fn is_vehicle(&self) -> bool {
+        self.belief.vehicle() > 0.5
+    }
+
     pub(super) fn is_confirmed(&self) -> bool {
         self.existence.is_confirmed()
     }

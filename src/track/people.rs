@@ -1,0 +1,97 @@
+//! People side by side: a cluster cannot tell their shoulders apart, but shows their heads.
+
+use super::placing::{Bounds, Placed};
+use crate::cloud::Scan;
+
+/// Heads are higher than this, and what is below it in a car are screens and seats.
+const LOWEST_HEAD_M: f32 = 1.5;
+/// Nobody is taller.
+const TALLEST_M: f32 = 2.1;
+/// Widest head, with a hat or a hood.
+const WIDEST_HEAD_M: f32 = 0.5;
+/// Gap between two heads, and distance between their middles.
+const LEAST_GAP_M: f32 = 0.12;
+const LEAST_APART_M: f32 = 0.35;
+const MOST_APART_M: f32 = 1.0;
+/// Room that each takes up at most, and how much more all of them.
+const ROOM_M: f32 = 0.75;
+const MORE_M: f32 = 0.2;
+/// More do not walk side by side.
+const MOST_PEOPLE: usize = 4;
+
+/// Neighbouring columns that show a head.
+#[derive(Debug, Clone, Copy)]
+struct Head {
+    first: usize,
+    last: usize,
+    /// Where it is from above: of its first column and of its last one.
+    from_m: [f32; 2],
+    to_m: [f32; 2],
+}
+
+impl Head {
+    fn middle_m(&self) -> [f32; 2] {
+        [0, 1].map(|axis| 0.5 * (self.from_m[axis] + self.to_m[axis]))
+    }
+}
+
+/// Where the returns of one person end and those of the next one begin, in a patch that shows
+/// several heads in its topmost layer; nothing in any other. The returns are in the order of the
+/// scan.
+pub(super) fn cuts(placed: &[Placed], bounds: &Bounds, scan: &Scan, cuts: &mut Vec<usize>) {
+    cuts.clear();
+    let long_m = distance_m(bounds.low_m, bounds.high_m);
+    let may_be_people = (LOWEST_HEAD_M..TALLEST_M).contains(&bounds.top_m)
+        && (2.0 * LEAST_APART_M..ROOM_M * MOST_PEOPLE as f32 + MORE_M).contains(&long_m);
+    if !may_be_people {
+        return;
+    }
+    let column_of = |placed: &Placed| scan.column(placed.point as usize);
+    let layer_of = |placed: &Placed| scan.layer(placed.point as usize);
+    let highest = placed.iter().map(layer_of).max().unwrap_or(0);
+    let mut heads = [None::<Head>; MOST_PEOPLE];
+    let mut count = 0;
+    let tops = placed.iter().filter(|placed| layer_of(placed) == highest);
+    for top in tops {
+        let (column, at_m) = (column_of(top), top.at_m);
+        match heads[count.max(1) - 1].as_mut() {
+            Some(head) if distance_m(head.to_m, at_m) < LEAST_GAP_M => {
+                (head.last, head.to_m) = (column, at_m);
+            }
+            _ if count == MOST_PEOPLE || top.above_m < LOWEST_HEAD_M => return,
+            _ => {
+                heads[count] = Some(Head {
+                    first: column,
+                    last: column,
+                    from_m: at_m,
+                    to_m: at_m,
+                });
+                count += 1;
+            }
+        }
+    }
+    let are_heads = heads
+        .iter()
+        .flatten()
+        .all(|head| distance_m(head.from_m, head.to_m) < WIDEST_HEAD_M);
+    if count < 2 || !are_heads || long_m > ROOM_M * count as f32 + MORE_M {
+        return;
+    }
+    for pair in heads[..count].windows(2) {
+        let [Some(one), Some(next)] = pair else {
+            return;
+        };
+        let apart_m = distance_m(one.middle_m(), next.middle_m());
+        if !(LEAST_APART_M..MOST_APART_M).contains(&apart_m) {
+            cuts.clear();
+            return;
+        }
+        let middle = (one.last + next.first) / 2;
+        cuts.push(placed.partition_point(|placed| column_of(placed) <= middle));
+    }
+}
+
+fn distance_m(from_m: [f32; 2], to_m: [f32; 2]) -> f32 {
+    let [x, y] = [0, 1].map(|axis| to_m[axis] - from_m[axis]);
+    (x * x + y * y).sqrt()
+}
