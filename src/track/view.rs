@@ -105,6 +105,7 @@ impl View {
         size_m: [f64; 2],
         size_deviation_m: [f64; 2],
         expected_m: Vector2<f64>,
+        yaw_variance: f64,
         is_moving: bool,
     ) -> (Vector2<f64>, Matrix2<f64>) {
         /// Standard deviation of an edge: noise of ranges and roundness of corners.
@@ -168,6 +169,12 @@ impl View {
                     }
                 };
         }
+        // What a direction is off turns the hidden middle about what is seen.
+        let seen = [0, 1].map(|axis| 0.5 * (self.low_m[axis] + self.high_m[axis]));
+        let askew = [1, 0].map(|other: usize| {
+            let lever_m = centre[other] - seen[other];
+            yaw_variance * lever_m * lever_m
+        });
         let local = |u: f64, v: f64| {
             Vector2::new(
                 u * self.cosine - v * self.sine,
@@ -176,10 +183,10 @@ impl View {
         };
         let turn = Matrix2::new(self.cosine, -self.sine, self.sine, self.cosine);
         let spread = Matrix2::new(
-            deviation[0] * deviation[0],
+            deviation[0] * deviation[0] + askew[0],
             0.0,
             0.0,
-            deviation[1] * deviation[1],
+            deviation[1] * deviation[1] + askew[1],
         );
         (
             local(centre[0], centre[1]),
@@ -206,7 +213,7 @@ mod tests {
         let view = View::of(&look, &spots, 0.0);
         let centre_x_m = |expected_x_m: f64, is_moving: bool| {
             let expected_m = Vector2::new(expected_x_m, 33.8);
-            let (centre_m, noise) = view.centre([4.3, 1.8], [0.1; 2], expected_m, is_moving);
+            let (centre_m, noise) = view.centre([4.3, 1.8], [0.1; 2], expected_m, 0.0, is_moving);
             (centre_m.x, libm::sqrt(noise[(0, 0)]))
         };
         for expected_x_m in [0.0, 2.0] {
@@ -233,7 +240,7 @@ mod tests {
         let view = View::of(&look, &spots, std::f64::consts::FRAC_PI_2);
         let rear_m = |length_m: f64| {
             let expected_m = Vector2::new(1.2, 25.0 + 0.5 * length_m);
-            let (centre_m, _) = view.centre([length_m, 2.5], [0.1; 2], expected_m, true);
+            let (centre_m, _) = view.centre([length_m, 2.5], [0.1; 2], expected_m, 0.0, true);
             centre_m.y - 0.5 * length_m
         };
         assert!((rear_m(12.0) - 25.0).abs() < 0.2, "{}", rear_m(12.0));

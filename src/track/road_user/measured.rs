@@ -41,7 +41,11 @@ impl Track {
         self.shape.learn(&view, look);
         let after = self.shape.size_m(self.belief.vehicle());
         self.keep_near_edges(look, before, after);
-        let (centre_m, noise) = self.centre(&view, self.motion.estimate().position_m);
+        let (centre_m, noise) = self.centre(
+            &view,
+            self.motion.estimate().position_m,
+            self.shape.yaw_variance.min(0.09),
+        );
         self.motion.measure_position(centre_m, noise);
         self.trails.push(centre_m, look);
         self.steer();

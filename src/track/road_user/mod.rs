@@ -28,6 +28,8 @@ const BIRTH_MPS: f64 = 6.0;
 /// Noise of a box's middle beside that of its edges, because its shape is not a box.
 const MIDDLE_M: f64 = 0.08;
 
+const MOST_ASKEW: f64 = 0.09;
+
 /// Length of the longest lorries with their trailers (Directive 96/53/EC).
 const LONGEST_M: f64 = 18.75;
 
@@ -123,7 +125,8 @@ impl Track {
         };
         track.belief = Belief::of(&track.qualities());
         let view = View::of(look, spots, track.shape.yaw_rad);
-        let (centre_m, noise) = track.centre(&view, look.middle_m);
+        let (centre_m, noise) =
+            track.centre(&view, look.middle_m, track.shape.yaw_variance.min(0.09));
         track.trails.begin(centre_m);
         track.born_m = centre_m;
         let birth_mps = if track.belief.vehicle() > 0.5 {
@@ -236,12 +239,18 @@ impl Track {
         self.is_moving_vehicle() && self.shape.is_tall() && is_tall(top_m)
     }
 
-    fn centre(&self, view: &View, expected_m: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+    fn centre(
+        &self,
+        view: &View,
+        expected_m: Vector2<f64>,
+        yaw_variance: f64,
+    ) -> (Vector2<f64>, Matrix2<f64>) {
         let vehicle = self.belief.vehicle();
         let (centre_m, noise) = view.centre(
             self.shape.size_m(vehicle),
             self.shape.size_deviation_m(vehicle),
             expected_m,
+            yaw_variance,
             self.is_moving_vehicle(),
         );
         (centre_m, noise + Matrix2::identity() * MIDDLE_M * MIDDLE_M)
@@ -252,7 +261,11 @@ impl Track {
     pub(super) fn cost(&self, spots: &[Spot], look: &Look) -> f64 {
         let view = View::of(look, spots, self.shape.yaw_rad);
         let estimate = self.motion.estimate();
-        let (centre_m, noise) = self.centre(&view, estimate.position_m);
+        let (centre_m, noise) = self.centre(
+            &view,
+            estimate.position_m,
+            self.shape.yaw_variance.min(MOST_ASKEW),
+        );
         let spread = estimate.position_covariance + noise;
         let off = centre_m - estimate.position_m;
         let Some(inverse) = spread.try_inverse() else {
