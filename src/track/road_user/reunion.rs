@@ -1,6 +1,6 @@
 //! A road user of which nothing was left, and which is seen again.
 
-use nalgebra::Vector2;
+use nalgebra::{Rotation2, Vector2};
 
 use super::{MOVING_MPS, Track};
 use crate::time::Time;
@@ -33,6 +33,7 @@ const RENEWED_S: f64 = 1.0;
 pub(super) struct Parting {
     position_m: Vector2<f64>,
     velocity_mps: Vector2<f64>,
+    yaw_rate_radps: f64,
     deviation_mps: f64,
     standing: f64,
     /// Returns on it.
@@ -45,6 +46,7 @@ impl Parting {
         Self {
             position_m: estimate.position_m,
             velocity_mps: estimate.velocity_mps,
+            yaw_rate_radps: estimate.yaw_rate_radps,
             deviation_mps: libm::sqrt(0.5 * estimate.velocity_covariance.trace()),
             standing: estimate.standing,
             points: points as f64,
@@ -75,27 +77,45 @@ impl Parting {
     /// velocity to this one; `None` if that is too far, or if the velocities do not go together.
     fn off_from_m(&self, parted: &Self, length_m: f64) -> Option<f64> {
         let gap_s = (self.at - parted.at).seconds();
-        let is_known = self.deviation_mps < UNKNOWN_MPS;
-        let velocity_mps = if is_known {
-            self.velocity_mps
-        } else {
-            parted.velocity_mps
-        };
-        let turn_rad = parted.velocity_mps.angle(&velocity_mps);
-        let speeds = [parted.velocity_mps, velocity_mps].map(|velocity| velocity.norm());
-        if parted.moves() && is_known {
-            let changed_mps = libm::fabs(speeds[1] - speeds[0]);
-            let is_other = turn_rad > TURN_RAD + TURN_RADPS * gap_s
-                || changed_mps > SPEED_SHARE * speeds[0].max(speeds[1]) + MOVING_MPS;
-            if is_other {
+        if self.deviation_mps < UNKNOWN_MPS {
+            if !self.goes_together_with(parted, gap_s) {
                 return None;
             }
-        } else if parted.moves() != self.moves() {
-            return None;
+            return self.off_arc_m(parted, self.velocity_mps, gap_s, length_m);
         }
-        let half_rad = (0.5 * turn_rad).max(1e-6);
-        let chord_m = 0.5 * (speeds[0] + speeds[1]) * gap_s * libm::sin(half_rad) / half_rad;
-        let course = (parted.velocity_mps + velocity_mps).try_normalize(1e-6);
+        // As long as its own velocity is not known, the other one went straight on or went on to
+        // turn.
+        let turned = Rotation2::new(parted.yaw_rate_radps * gap_s) * parted.velocity_mps;
+        let ends = [parted.velocity_mps, turned];
+        let off_m = ends.map(|end_mps| self.off_arc_m(parted, end_mps, gap_s, length_m));
+        off_m.into_iter().flatten().min_by(f64::total_cmp)
+    }
+
+    /// Whether what had one velocity can have the other one so much later.
+    fn goes_together_with(&self, parted: &Self, gap_s: f64) -> bool {
+        if !parted.moves() {
+            return !self.moves();
+        }
+        let turn_rad = parted.velocity_mps.angle(&self.velocity_mps);
+        let speeds = [parted, self].map(|parting| parting.velocity_mps.norm());
+        let changed_mps = libm::fabs(speeds[1] - speeds[0]);
+        turn_rad <= TURN_RAD + TURN_RADPS * gap_s
+            && changed_mps <= SPEED_SHARE * speeds[0].max(speeds[1]) + MOVING_MPS
+    }
+
+    /// How far this is from the end of an arc from where the other one parted, at which it has a
+    /// velocity; `None` if that is too far.
+    fn off_arc_m(
+        &self,
+        parted: &Self,
+        end_mps: Vector2<f64>,
+        gap_s: f64,
+        length_m: f64,
+    ) -> Option<f64> {
+        let half_rad = (0.5 * parted.velocity_mps.angle(&end_mps)).max(1e-6);
+        let speed_mps = 0.5 * (parted.velocity_mps.norm() + end_mps.norm());
+        let chord_m = speed_mps * gap_s * libm::sin(half_rad) / half_rad;
+        let course = (parted.velocity_mps + end_mps).try_normalize(1e-6);
         let way_m = course.map_or(Vector2::zeros(), |course| course * chord_m);
         let off_m = (self.position_m - parted.position_m - way_m).norm();
         let farthest_m = OFF_M + OFF_PER_LENGTH * length_m + OFF_PER_WAY * way_m.norm();
@@ -167,6 +187,7 @@ mod tests {
         Parting {
             position_m: Vector2::new(cosine, sine) * radius_m,
             velocity_mps: Vector2::new(-sine, cosine) * speed_mps,
+            yaw_rate_radps: speed_mps / radius_m,
             deviation_mps: 0.3,
             standing: 0.0,
             points: 9.0,
