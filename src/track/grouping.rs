@@ -35,6 +35,8 @@ pub(super) struct Grouping {
     free: Vec<(usize, [Vector2<f64>; 2])>,
     /// The group that each one joins.
     target: Vec<usize>,
+    /// How many large patches each track has.
+    held: Vec<u32>,
     /// Group numbers of people who are told apart.
     several: Vec<u32>,
     /// Group numbers of what was cut off structure, ascending.
@@ -95,6 +97,11 @@ impl Grouping {
         &self.spots[group.begin..group.end]
     }
 
+    /// Whether a track has several things in its place that do not touch.
+    pub(super) fn holds_several(&self, track: usize) -> bool {
+        self.held[track] > 1
+    }
+
     /// Whether a group was cut off structure.
     pub(super) fn is_suspect(&self, group: &Group) -> bool {
         self.suspects.binary_search(&group.number).is_ok()
@@ -107,6 +114,8 @@ impl Grouping {
         self.forecasts.take(tracks, origin_m);
         self.suspects.clear();
         self.several.clear();
+        self.held.clear();
+        self.held.resize(tracks.len(), 0);
         self.spots.clear();
         for (number, patch) in self.placer.patches().iter().enumerate() {
             let own = (tracks.len() + number) as u32;
@@ -151,6 +160,9 @@ impl Grouping {
             let rests = |track: usize| self.forecasts.of(track).rests;
             if owner.is_some_and(rests) {
                 continue;
+            }
+            if let Some(track) = owner.filter(|_| patch.is_large()) {
+                self.held[track] += 1;
             }
             for (placed, track) in placed.iter().zip(self.claims.owners()) {
                 let group = track.map(|track| track as u32).or(is_whole.then_some(own));

@@ -179,12 +179,20 @@ impl ObjectTracker {
     fn update(&mut self, scene: &Scene<'_>, end: Time) {
         let placement = scene.sweep.sensor.placement();
         let sensor_height_m = scene.ground.plane.height_m();
-        for (track, pair) in self.tracks.iter_mut().zip(self.assigner.pairs()) {
+        for (number, (track, pair)) in self
+            .tracks
+            .iter_mut()
+            .zip(self.assigner.pairs())
+            .enumerate()
+        {
             match pair.map(|number| &self.grouping.groups()[number]) {
                 Some(group) => {
                     let spots = self.grouping.spots(group);
                     let floor_z_m = floor_z_m(spots, scene);
                     track.measure(spots, &group.look, end, floor_z_m, &mut self.outline);
+                    if self.grouping.holds_several(number) {
+                        track.doubt_as_one();
+                    }
                 }
                 None if track.rests() => {}
                 None => {

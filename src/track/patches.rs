@@ -29,6 +29,11 @@ impl Patch {
         (side_m(0) * side_m(0) + side_m(1) * side_m(1)).sqrt()
     }
 
+    /// Whether it is more than a person.
+    pub(super) fn is_large(&self) -> bool {
+        self.diagonal_m() > 1.5
+    }
+
     /// Whether it can be a road user as a whole.
     pub(super) fn can_be_road_user(&self, parameters: &TrackParameters) -> bool {
         self.diagonal_m() <= parameters.longest_object_m

@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 
 use super::reunion::Parting;
-use super::{MOVING_MPS, Track};
+use super::{MOVING_MPS, SURELY_NONE, Track};
 use crate::time::{Span, Time};
 use crate::track::class::{Belief, Qualities};
 use crate::track::look::Look;
@@ -14,9 +14,8 @@ use crate::track::view::View;
 /// Speed from which a vehicle shows clearly where it goes.
 const FAST_MPS: f64 = 1.5;
 
-/// Probability of a road user below which something is structure for sure...
-const SURELY_NONE: f64 = 0.05;
-/// ...of which motion says nothing, if it is as long as this: shorter ones are seen whole.
+/// Of what is structure for sure motion says nothing, if it is as long as this: shorter ones are
+/// seen whole.
 const LONG_M: f64 = 2.5;
 /// How much higher than known something may be where a ray passes far away.
 const HIGHER_M: f64 = 0.4;

@@ -30,6 +30,9 @@ const MIDDLE_M: f64 = 0.08;
 
 const MOST_ASKEW: f64 = 0.09;
 
+/// Probability of a road user below which something is structure for sure.
+const SURELY_NONE: f64 = 0.05;
+
 /// Length of the longest lorries with their trailers (Directive 96/53/EC).
 const LONGEST_M: f64 = 18.75;
 
@@ -285,6 +288,13 @@ impl Track {
             + 0.5 * libm::log(spread.determinant().max(1e-6) / 0.01).max(0.0)
             + 4.0 * excess_m
             + 0.3 * vanished
+    }
+
+    /// What it was taken for is several things.
+    pub(super) fn doubt_as_one(&mut self) {
+        if self.belief.road_user() < SURELY_NONE && !self.moves && self.is_confirmed() {
+            self.existence.deny();
+        }
     }
 
     /// Nothing was found that is this object.
