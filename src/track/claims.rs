@@ -56,6 +56,11 @@ impl Claims {
         owners.map(|owner| (*owner != NOBODY).then_some(*owner as usize))
     }
 
+    /// The track with the lowest number that has any of the returns.
+    pub(super) fn first(&self) -> Option<usize> {
+        self.owners().flatten().min()
+    }
+
     /// The only track that has any of the returns, and the share of them that it has.
     pub(super) fn only(&self) -> Option<(usize, f64)> {
         let mut owners = self.owners().flatten();

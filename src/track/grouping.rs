@@ -157,6 +157,16 @@ impl Grouping {
             let only = self.claims.only();
             let owner = only.filter(|(_, share)| is_whole && *share > LEAST_CLAIM);
             let owner = owner.map(|(track, _)| track);
+            let all_young = is_whole
+                && patch.is_long()
+                && top_m > 1.2
+                && self.near.len() > 1
+                && self
+                    .near
+                    .iter()
+                    .all(|track| tracks[*track].is_young(scene.scan.time()));
+            let young = if all_young { self.claims.first() } else { None };
+            let owner = owner.or(young);
             let rests = |track: usize| self.forecasts.of(track).rests;
             if owner.is_some_and(rests) {
                 continue;
@@ -175,7 +185,9 @@ impl Grouping {
                 }
             }
             let spots = &mut self.spots[begin..];
-            if let Some(track) = owner.filter(|track| fits(spots, top_m, &tracks[*track])) {
+            if let Some(track) =
+                owner.filter(|track| young.is_some() || fits(spots, top_m, &tracks[*track]))
+            {
                 for spot in spots.iter_mut() {
                     spot.group = track as u32;
                 }

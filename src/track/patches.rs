@@ -34,6 +34,10 @@ impl Patch {
         self.diagonal_m() > 1.5
     }
 
+    pub(super) fn is_long(&self) -> bool {
+        self.diagonal_m() > 2.5
+    }
+
     /// Whether it can be a road user as a whole.
     pub(super) fn can_be_road_user(&self, parameters: &TrackParameters) -> bool {
         self.diagonal_m() <= parameters.longest_object_m

@@ -208,6 +208,10 @@ impl Track {
         self.moves && self.shape.front_known && self.belief.vehicle() > 0.5
     }
 
+    pub(super) fn is_young(&self, now: Time) -> bool {
+        !self.is_published && (now - self.first_seen).seconds() < 1.6
+    }
+
     /// Whether it is rather a vehicle than anything else on the road.
     pub(super) fn is_vehicle(&self) -> bool {
         self.belief.vehicle() > 0.5
