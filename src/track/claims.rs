@@ -56,7 +56,7 @@ impl Claims {
         owners.map(|owner| (*owner != NOBODY).then_some(*owner as usize))
     }
 
-    /// The track with the lowest number that has any of the returns.
+    /// The first of the tracks that have any of the returns.
     pub(super) fn first(&self) -> Option<usize> {
         self.owners().flatten().min()
     }

@@ -7,13 +7,14 @@ use nalgebra::Vector2;
 use super::claims::Claims;
 use super::forecast::Forecasts;
 use super::look::Look;
-use super::patches::Placer;
+use super::patches::{Patch, Placer};
 use super::rectangle::Extent;
 use super::road_user::Track;
 use super::spots::{Spot, bounds_m, places_m};
 use super::strays::Strays;
-use super::{Scene, TrackParameters};
+use super::{Scene, TrackParameters, seam};
 use crate::cluster::Clusters;
+use crate::time::Time;
 
 /// The groups of a revolution.
 #[derive(Debug, Clone, Default)]
@@ -69,6 +70,12 @@ const GAP_M: f64 = 0.45;
 const LONGEST_JOINED_M: f64 = 5.4;
 /// Share of a cluster in the place of a track, from which on all of it may belong to that.
 const LEAST_CLAIM: f64 = 0.3;
+/// What is longer and higher may be pieces of a lorry; shorter is who walks side by side, lower
+/// are kerbs.
+const LONG_M: f64 = 2.5;
+const LOWEST_LONG_M: f32 = 1.2;
+/// Larger ones are more than a person, or a part of a car.
+const LARGE_M: f64 = 1.5;
 /// Fewer returns are noise.
 const FEWEST_RETURNS: usize = 3;
 
@@ -117,61 +124,28 @@ impl Grouping {
         self.held.clear();
         self.held.resize(tracks.len(), 0);
         self.spots.clear();
-        for (number, patch) in self.placer.patches().iter().enumerate() {
+        for number in 0..self.placer.patches().len() {
+            let patch = self.placer.patches()[number];
             let own = (tracks.len() + number) as u32;
             if patch.is_suspect {
                 self.suspects.push(own);
             }
             let is_whole = patch.can_be_road_user(parameters);
-            self.near.clear();
-            self.near.extend(self.forecasts.near(patch));
-            if patch.others != [0; 2] {
-                let forecasts = &self.forecasts;
-                let patches = self.placer.patches();
-                self.near.retain(|track| {
-                    tracks[*track].is_vehicle() || forecasts.is_nearest(*track, patches, number)
-                });
-                self.several.push(own);
-                let people = self
-                    .near
-                    .iter()
-                    .filter(|track| !tracks[**track].is_vehicle());
-                self.several.extend(people.map(|track| *track as u32));
-            }
+            self.find_near(number, own, tracks);
             if self.near.is_empty() && !is_whole {
                 continue;
             }
-            let top_m = f64::from(patch.bounds.top_m);
-            let is_lorry =
-                |track: &usize| tracks[*track].is_published && tracks[*track].may_be_lorry(top_m);
-            if self.near.iter().any(is_lorry) {
-                // Pieces of it are no objects.
-                self.near.retain(|track| tracks[*track].is_published);
-            }
             let begin = self.spots.len();
-            let placed = self.placer.placed(patch);
+            let placed = self.placer.placed(&patch);
             self.claims
                 .settle(placed, &self.near, &self.forecasts, is_whole);
-            // A part that reaches out of the only box belongs to it as long as the whole can be
-            // one object.
-            let only = self.claims.only();
-            let owner = only.filter(|(_, share)| is_whole && *share > LEAST_CLAIM);
-            let owner = owner.map(|(track, _)| track);
-            let all_young = is_whole
-                && patch.is_long()
-                && top_m > 1.2
-                && self.near.len() > 1
-                && self
-                    .near
-                    .iter()
-                    .all(|track| tracks[*track].is_young(scene.scan.time()));
-            let young = if all_young { self.claims.first() } else { None };
-            let owner = owner.or(young);
+            let owner = self.owner(&patch, is_whole, tracks, scene.scan.time());
+            let owns = owner.map(|(track, _)| track);
             let rests = |track: usize| self.forecasts.of(track).rests;
-            if owner.is_some_and(rests) {
+            if owns.is_some_and(rests) {
                 continue;
             }
-            if let Some(track) = owner.filter(|_| patch.is_large()) {
+            if let Some(track) = owns.filter(|_| patch.diagonal_m() > LARGE_M) {
                 self.held[track] += 1;
             }
             for (placed, track) in placed.iter().zip(self.claims.owners()) {
@@ -185,15 +159,65 @@ impl Grouping {
                 }
             }
             let spots = &mut self.spots[begin..];
-            if let Some(track) =
-                owner.filter(|track| young.is_some() || fits(spots, top_m, &tracks[*track]))
+            let top_m = f64::from(patch.bounds.top_m);
+            let fits = |track: usize| fits(spots, top_m, &tracks[track]);
+            if let Some((track, _)) =
+                owner.filter(|(track, at_any_size)| *at_any_size || fits(*track))
             {
                 for spot in spots.iter_mut() {
                     spot.group = track as u32;
                 }
             }
-            align_seam(spots, tracks, scene.scan.duration_s());
+            seam::align(spots, tracks, scene.scan.duration_s());
         }
+    }
+
+    /// Finds the tracks that can have returns of a patch, which has a group number of its own.
+    fn find_near(&mut self, number: usize, own: u32, tracks: &[Track]) {
+        let patches = self.placer.patches();
+        let patch = &patches[number];
+        self.near.clear();
+        self.near.extend(self.forecasts.near(patch));
+        if patch.is_one_of_several() {
+            // Each of several people is somebody, unless a car was taken for them.
+            let is_vehicle = |track: &usize| tracks[*track].is_vehicle();
+            let forecasts = &self.forecasts;
+            self.near
+                .retain(|track| is_vehicle(track) || forecasts.is_nearest(*track, patches, number));
+            let people = self.near.iter().filter(|track| !is_vehicle(track));
+            self.several.push(own);
+            self.several.extend(people.map(|track| *track as u32));
+        }
+        let top_m = f64::from(patch.bounds.top_m);
+        let is_lorry = |track: &Track| track.is_published && track.may_be_lorry(top_m);
+        if self.near.iter().any(|track| is_lorry(&tracks[*track])) {
+            // Pieces of it are no objects.
+            self.near.retain(|track| tracks[*track].is_published);
+        }
+    }
+
+    /// The track to which all of a patch belongs, and whether it does so at any size. A patch that
+    /// reaches out of the only box belongs to it as long as the whole can be one object; several
+    /// tracks that are all young may be pieces of something long that moves by more than their
+    /// boxes from one revolution to the next: all of it goes on as the first of them.
+    fn owner(
+        &self,
+        patch: &Patch,
+        is_whole: bool,
+        tracks: &[Track],
+        now: Time,
+    ) -> Option<(usize, bool)> {
+        if !is_whole {
+            return None;
+        }
+        let is_long = patch.diagonal_m() > LONG_M && patch.bounds.top_m > LOWEST_LONG_M;
+        let are_young = || self.near.iter().all(|track| tracks[*track].is_young(now));
+        if is_long && self.near.len() > 1 && are_young() {
+            return self.claims.first().map(|track| (track, true));
+        }
+        let only = self.claims.only();
+        let only = only.filter(|(_, share)| *share > LEAST_CLAIM);
+        only.map(|(track, _)| (track, false))
     }
 
     /// Puts the spots of every group side by side and looks at it.
@@ -356,27 +380,6 @@ impl Grouping {
     fn bounds(&self, group: &Group) -> [Vector2<f64>; 2] {
         let corners_m = bounds_m(self.spots(group).iter());
         corners_m.map(|corner_m| Vector2::from(corner_m.map(f64::from)))
-    }
-}
-
-/// What moves is seen twice at the seam of the sweep, a revolution apart: brings the older part
-/// of a known object, of which spots are in the order of the scan, to the time of the newer.
-fn align_seam(spots: &mut [Spot], tracks: &[Track], duration_s: f64) {
-    let half_s = 0.5 * duration_s as f32;
-    let (Some(oldest), Some(newest)) = (spots.first(), spots.last()) else {
-        return;
-    };
-    if oldest.age_s - newest.age_s <= half_s {
-        return;
-    }
-    for spot in spots.iter_mut().filter(|spot| spot.age_s > half_s) {
-        if let Some(track) = tracks.get(spot.group as usize) {
-            let moved_m = track.velocity_mps() * duration_s;
-            for axis in 0..2 {
-                spot.at_m[axis] += moved_m[axis] as f32;
-            }
-            spot.age_s -= duration_s as f32;
-        }
     }
 }
 

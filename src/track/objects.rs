@@ -191,7 +191,7 @@ impl ObjectTracker {
                     let floor_z_m = floor_z_m(spots, scene);
                     track.measure(spots, &group.look, end, floor_z_m, &mut self.outline);
                     if self.grouping.holds_several(number) {
-                        track.doubt_as_one();
+                        track.give_way();
                     }
                 }
                 None if track.rests() => {}
@@ -389,6 +389,74 @@ mod tests {
             see(&mut tracker, &later(&nothing, 0.1 * f64::from(revolution)));
         }
         assert_eq!(tracker.tracks.len(), 0);
+    }
+
+    #[test]
+    fn who_comes_at_120_km_h_is_one_and_known_before_it_is_near() {
+        let mut tracker = ObjectTracker::default();
+        for revolution in 0..12 {
+            let range_m = 55.0 - 3.3 * f64::from(revolution);
+            // 1.8 m wide, from 0.3 to 1.5 m above the ground.
+            let half = libm::round(0.9 / range_m / (2.0_f64.to_radians() / 10.0)) as usize;
+            let scan = scan_of(1800, |column, layer| {
+                let elevation_rad = (2.0 * layer as f64 - 15.0).to_radians();
+                let height_m = 1.9 + range_m * libm::sin(elevation_rad);
+                let is_met = column.abs_diff(500) <= half && (0.3..1.5).contains(&height_m);
+                u16::from(is_met) * (100.0 * range_m) as u16
+            });
+            see(&mut tracker, &later(&scan, 0.1 * f64::from(revolution)));
+        }
+        let [car] = tracker.objects() else {
+            panic!("{:?}", tracker.objects());
+        };
+        assert!(car.id == 0 && (car.speed_mps - 33.0).abs() < 2.0, "{car:?}");
+    }
+
+    #[test]
+    fn a_lorry_that_comes_out_from_behind_a_house_begins_no_track_for_each_piece() {
+        let mut tracker = ObjectTracker::default();
+        for revolution in 0..8 {
+            // 8 m long and 15 m away; it advances by 44 columns, which are 2.3 m.
+            let front: usize = 400 + 44 * revolution;
+            let rear = front.saturating_sub(153).max(375);
+            let scan = scan_of(1800, |column, layer| {
+                let is_met = (rear..front).contains(&column) && (3..9).contains(&layer);
+                u16::from(is_met) * 1500
+            });
+            see(&mut tracker, &later(&scan, 0.1 * revolution as f64));
+        }
+        assert!(tracker.next_id <= 2, "{}", tracker.next_id);
+    }
+
+    #[test]
+    fn two_people_are_two_once_their_heads_were_seen() {
+        let person = |first: usize, top: usize| {
+            move |column: usize| match column.checked_sub(first)? {
+                5..10 => Some(top),
+                ..15 => Some(6),
+                _ => None,
+            }
+        };
+        let pair = |top: usize| {
+            let (left, right) = (person(100, top), person(115, top));
+            scan_of(1800, |column, layer| {
+                let highest = left(column).or(right(column));
+                let is_met = highest.is_some_and(|highest| (4..=highest).contains(&layer));
+                u16::from(is_met) * 1000
+            })
+        };
+        let mut tracker = ObjectTracker::default();
+        let mut counts = vec![];
+        for revolution in 0..15 {
+            // The heads are between two layers at first, and again in the end.
+            let top = if (5..10).contains(&revolution) { 7 } else { 6 };
+            see(
+                &mut tracker,
+                &later(&pair(top), 0.1 * f64::from(revolution)),
+            );
+            counts.push(tracker.tracks.len());
+        }
+        assert_eq!((counts[4], counts[9], counts[14]), (1, 2, 2), "{counts:?}");
     }
 
     /// Four layers and ten columns at a range; in some columns the ray above them meets more.

@@ -95,3 +95,77 @@ fn distance_m(from_m: [f32; 2], to_m: [f32; 2]) -> f32 {
     let [x, y] = [0, 1].map(|axis| to_m[axis] - from_m[axis]);
     (x * x + y * y).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::tests::scan_of;
+    use crate::track::tests::spots_of;
+
+    /// Where what is 10 m away is cut that reaches up to a layer in each of its columns, of which
+    /// one is 3.5 cm wide.
+    fn cuts_of(top_layer: impl Fn(usize) -> Option<usize>) -> Vec<usize> {
+        let scan = scan_of(1800, |column, layer| {
+            let is_met =
+                (4..).contains(&layer) && top_layer(column).is_some_and(|top| layer <= top);
+            u16::from(is_met) * 1000
+        });
+        let placed: Vec<Placed> = spots_of(&scan)
+            .iter()
+            .map(|spot| Placed {
+                at_m: spot.at_m,
+                above_m: spot.above_m,
+                point: spot.point,
+                is_brought: false,
+            })
+            .collect();
+        let mut found = vec![];
+        cuts(&placed, &Bounds::of(&placed), &scan, &mut found);
+        found
+    }
+
+    /// Columns of a body up to its shoulders, with a head in the middle.
+    fn person(first: usize) -> impl Fn(usize) -> Option<usize> {
+        move |column| match column.checked_sub(first)? {
+            5..10 => Some(7),
+            ..15 => Some(6),
+            _ => None,
+        }
+    }
+
+    #[test]
+    fn people_whose_shoulders_touch_are_cut_between_their_heads() {
+        let (left, right) = (person(100), person(115));
+        let found = cuts_of(|column| left(column).or(right(column)));
+        // Fifteen columns of three layers, and five of a fourth one.
+        assert_eq!(found, [50]);
+        let third = person(130);
+        let found = cuts_of(|column| left(column).or(right(column)).or(third(column)));
+        assert_eq!(found, [50, 100]);
+    }
+
+    #[test]
+    fn nobody_is_cut_and_no_car_either() {
+        assert!(cuts_of(person(100)).is_empty());
+        // A roof that is narrower than the body, and two screens beside each other.
+        let roof = |column: usize| match column {
+            110..140 => Some(7),
+            100..150 => Some(6),
+            _ => None,
+        };
+        assert!(cuts_of(roof).is_empty());
+        let screens = |column: usize| match column {
+            102..108 | 142..148 => Some(7),
+            100..150 => Some(6),
+            _ => None,
+        };
+        assert!(cuts_of(screens).is_empty());
+        // What is lower than a head is no head.
+        let low = |column: usize| match column {
+            105..110 | 120..125 => Some(5),
+            100..130 => Some(4),
+            _ => None,
+        };
+        assert!(cuts_of(low).is_empty());
+    }
+}

@@ -7,6 +7,8 @@
 use nalgebra::Vector2;
 
 use super::Scene;
+use super::road_user::Track;
+use super::spots::Spot;
 use crate::cloud::{MAX_LAYERS, Scan};
 
 /// Columns on either side of the seam that are compared.
@@ -56,6 +58,27 @@ fn nearest<'a>(points: impl Iterator<Item = &'a u32>, scan: &Scan) -> [Option<f3
         ranges_m[scan.layer(point)].get_or_insert(scan.range_m()[point]);
     }
     ranges_m
+}
+
+/// What moves is seen twice at the seam of the sweep, a revolution apart: brings the older part
+/// of a known object, of which spots are in the order of the scan, to the time of the newer.
+pub(super) fn align(spots: &mut [Spot], tracks: &[Track], duration_s: f64) {
+    let half_s = 0.5 * duration_s as f32;
+    let (Some(oldest), Some(newest)) = (spots.first(), spots.last()) else {
+        return;
+    };
+    if oldest.age_s - newest.age_s <= half_s {
+        return;
+    }
+    for spot in spots.iter_mut().filter(|spot| spot.age_s > half_s) {
+        if let Some(track) = tracks.get(spot.group as usize) {
+            let moved_m = track.velocity_mps() * duration_s;
+            for axis in 0..2 {
+                spot.at_m[axis] += moved_m[axis] as f32;
+            }
+            spot.age_s -= duration_s as f32;
+        }
+    }
 }
 
 #[cfg(test)]

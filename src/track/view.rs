@@ -98,8 +98,8 @@ impl View {
         self.is_whole
     }
 
-    /// Where the middle of a box of this size is, given where it is expected and whether it moves,
-    /// and how sure that is, as a covariance in the local frame.
+    /// Where the middle of a box of this size is, given where it is expected, how sure its direction
+    /// is and whether it moves, and how sure that is, as a covariance in the local frame.
     pub(super) fn centre(
         &self,
         size_m: [f64; 2],
@@ -223,6 +223,29 @@ mod tests {
         let (x_m, deviation_m) = centre_x_m(0.0, false);
         assert_eq!(x_m, centre_x_m(2.0, false).0);
         assert!(deviation_m < 0.3);
+    }
+
+    #[test]
+    fn the_middle_is_the_less_sure_the_farther_it_is_from_what_is_seen_askew() {
+        // The rear of a car straight ahead, 20 m away.
+        let scan = scan_of(1800, |column, layer| match column {
+            0..26 if (5..8).contains(&layer) => 2000,
+            _ => 0,
+        });
+        let spots = spots_of(&scan);
+        let look = Look::at(&spots, &scan, Vector2::zeros());
+        let view = View::of(&look, &spots, std::f64::consts::FRAC_PI_2);
+        let across_m = |length_m: f64, yaw_variance: f64| {
+            let expected_m = Vector2::new(0.9, 20.0 + 0.5 * length_m);
+            let (_, noise) = view.centre([length_m, 1.8], [0.0; 2], expected_m, yaw_variance, true);
+            libm::sqrt(noise[(0, 0)])
+        };
+        let sure_m = across_m(4.3, 0.0);
+        assert!((across_m(8.0, 0.0) - sure_m).abs() < 1e-9);
+        // 0.2 rad over half the length.
+        let askew_m = libm::hypot(sure_m, 0.2 * 2.15);
+        assert!((across_m(4.3, 0.04) - askew_m).abs() < 0.02);
+        assert!(across_m(8.0, 0.04) > across_m(4.3, 0.04));
     }
 
     #[test]

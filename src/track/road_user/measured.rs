@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 use super::reunion::Parting;
 use super::{MOVING_MPS, SURELY_NONE, Track};
 use crate::time::{Span, Time};
-use crate::track::class::{Belief, Qualities};
+use crate::track::belief::{Belief, Qualities};
 use crate::track::look::Look;
 use crate::track::shape::fitted_yaw;
 use crate::track::spots::Spot;
@@ -40,11 +40,7 @@ impl Track {
         self.shape.learn(&view, look);
         let after = self.shape.size_m(self.belief.vehicle());
         self.keep_near_edges(look, before, after);
-        let (centre_m, noise) = self.centre(
-            &view,
-            self.motion.estimate().position_m,
-            self.shape.yaw_variance.min(0.09),
-        );
+        let (centre_m, noise) = self.centre(&view, self.motion.estimate().position_m);
         self.motion.measure_position(centre_m, noise);
         self.trails.push(centre_m, look);
         self.steer();
@@ -207,6 +203,36 @@ mod tests {
         let wall = seen(1.0);
         assert!(wall.belief.road_user() < SURELY_NONE);
         assert!(!wall.moves && wall.travelled_m == 0.0);
+    }
+
+    #[test]
+    fn what_shows_its_length_and_hardly_any_width_is_thin_within_a_second() {
+        // A rail 4 m to the side that leads away, of which 6 m are met.
+        let scan = scan_of(1800, |column, layer| match column {
+            70..110 if layer == 6 => (400.0 / (0.2 * column as f64).to_radians().sin()) as u16,
+            _ => 0,
+        });
+        let spots = spots_of(&scan);
+        let look = Look::at(&spots, &scan, Vector2::zeros());
+        let (mut outline, mut end) = (vec![], scan.time());
+        let mut track = Track::new(0, false, &spots, &look, end, 0.0, &mut outline);
+        // It was seen askew before.
+        track.shape.seen_m[1] = 0.7;
+        for _ in 0..10 {
+            end = end + Span::from_seconds(0.1);
+            track.measure(&spots, &look, end, 0.0, &mut outline);
+        }
+        let wide_m = track.qualities().wide_m;
+        assert!(wide_m.is_some_and(|wide_m| wide_m < 0.25), "{wide_m:?}");
+    }
+
+    #[test]
+    fn only_what_is_no_road_user_gives_way_to_several_things_in_its_place() {
+        let [mut car, mut wall] = [0.0, 1.0].map(seen);
+        (car.moves, wall.moves) = (false, false);
+        car.give_way();
+        wall.give_way();
+        assert!(wall.existence.is_gone() && !car.existence.is_gone());
     }
 
     #[test]

@@ -10,7 +10,7 @@ mod rest;
 
 mod reunion;
 
-use super::class::Belief;
+use super::belief::Belief;
 use super::existence::Existence;
 use super::look::Look;
 use super::motion::Motion;
@@ -23,12 +23,15 @@ use super::{Rectangle, TrackParameters};
 use crate::time::{Span, Time};
 use reunion::Parting;
 
-/// Standard deviation of the velocity of something seen for the first time.
+/// Standard deviation of the velocity of something seen for the first time, and of a vehicle: who
+/// comes at 100 km/h is two of them fast.
 const BIRTH_MPS: f64 = 6.0;
+const VEHICLE_BIRTH_MPS: f64 = 14.0;
 /// Noise of a box's middle beside that of its edges, because its shape is not a box.
 const MIDDLE_M: f64 = 0.08;
 
-const MOST_ASKEW: f64 = 0.09;
+/// Variance of a direction beyond which the middle lies where it is seen, whatever the direction.
+const MOST_YAW_VARIANCE: f64 = 0.09;
 
 /// Probability of a road user below which something is structure for sure.
 const SURELY_NONE: f64 = 0.05;
@@ -38,6 +41,9 @@ const LONGEST_M: f64 = 18.75;
 
 /// Returns below which an object may be no cluster in the next revolution.
 const SPARSE: usize = 16;
+
+/// Time for which hardly anything is known of something new.
+const YOUNG_S: f64 = 1.6;
 
 /// Speed from which an object counts as moving.
 const MOVING_MPS: f64 = 0.6;
@@ -128,12 +134,11 @@ impl Track {
         };
         track.belief = Belief::of(&track.qualities());
         let view = View::of(look, spots, track.shape.yaw_rad);
-        let (centre_m, noise) =
-            track.centre(&view, look.middle_m, track.shape.yaw_variance.min(0.09));
+        let (centre_m, noise) = track.centre(&view, look.middle_m);
         track.trails.begin(centre_m);
         track.born_m = centre_m;
-        let birth_mps = if track.belief.vehicle() > 0.5 {
-            14.0
+        let birth_mps = if track.is_vehicle() {
+            VEHICLE_BIRTH_MPS
         } else {
             BIRTH_MPS
         };
@@ -208,8 +213,9 @@ impl Track {
         self.moves && self.shape.front_known && self.belief.vehicle() > 0.5
     }
 
+    /// Whether hardly anything is known of it.
     pub(super) fn is_young(&self, now: Time) -> bool {
-        !self.is_published && (now - self.first_seen).seconds() < 1.6
+        !self.is_published && (now - self.first_seen).seconds() < YOUNG_S
     }
 
     /// Whether it is rather a vehicle than anything else on the road.
@@ -246,18 +252,13 @@ impl Track {
         self.is_moving_vehicle() && self.shape.is_tall() && is_tall(top_m)
     }
 
-    fn centre(
-        &self,
-        view: &View,
-        expected_m: Vector2<f64>,
-        yaw_variance: f64,
-    ) -> (Vector2<f64>, Matrix2<f64>) {
+    fn centre(&self, view: &View, expected_m: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         let vehicle = self.belief.vehicle();
         let (centre_m, noise) = view.centre(
             self.shape.size_m(vehicle),
             self.shape.size_deviation_m(vehicle),
             expected_m,
-            yaw_variance,
+            self.shape.yaw_variance.min(MOST_YAW_VARIANCE),
             self.is_moving_vehicle(),
         );
         (centre_m, noise + Matrix2::identity() * MIDDLE_M * MIDDLE_M)
@@ -268,11 +269,7 @@ impl Track {
     pub(super) fn cost(&self, spots: &[Spot], look: &Look) -> f64 {
         let view = View::of(look, spots, self.shape.yaw_rad);
         let estimate = self.motion.estimate();
-        let (centre_m, noise) = self.centre(
-            &view,
-            estimate.position_m,
-            self.shape.yaw_variance.min(MOST_ASKEW),
-        );
+        let (centre_m, noise) = self.centre(&view, estimate.position_m);
         let spread = estimate.position_covariance + noise;
         let off = centre_m - estimate.position_m;
         let Some(inverse) = spread.try_inverse() else {
@@ -294,8 +291,9 @@ impl Track {
             + 0.3 * vanished
     }
 
-    /// What it was taken for is several things.
-    pub(super) fn doubt_as_one(&mut self) {
+    /// There are several things in its place that do not touch: if it is no road user, each of them
+    /// may be one.
+    pub(super) fn give_way(&mut self) {
         if self.belief.road_user() < SURELY_NONE && !self.moves && self.is_confirmed() {
             self.existence.deny();
         }

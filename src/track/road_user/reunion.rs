@@ -216,6 +216,32 @@ mod tests {
     }
 
     #[test]
+    fn who_is_too_new_to_have_a_velocity_is_looked_for_straight_on_and_on_the_arc() {
+        let car = |angle_rad| on_circle(11.0, 8.0, angle_rad);
+        let parted = car(0.0);
+        let unknown = |seen: Parting| Parting {
+            velocity_mps: Vector2::zeros(),
+            deviation_mps: 4.0,
+            standing: 0.6,
+            ..seen
+        };
+        let on_arc = unknown(car(1.0));
+        let gap_s = (on_arc.at - parted.at).seconds();
+        let ahead = Parting {
+            position_m: parted.position_m + parted.velocity_mps * gap_s,
+            ..on_arc
+        };
+        let aside = Parting {
+            position_m: 2.0 * ahead.position_m - on_arc.position_m,
+            ..on_arc
+        };
+        let off_m = |seen: &Parting| seen.off_from_m(&parted, 1.0);
+        assert!(off_m(&on_arc).is_some_and(|off_m| off_m < 0.1));
+        assert!(off_m(&ahead).is_some_and(|off_m| off_m < 0.1));
+        assert_eq!(off_m(&aside), None);
+    }
+
+    #[test]
     fn a_glimpse_is_no_parting_unless_it_is_all_there_is() {
         let parting = at(0.0);
         let soon = parting.at + Span::from_seconds(0.1);

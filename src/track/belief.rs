@@ -1,0 +1,564 @@
+//! What an object is, from what was seen of it so far.
+//!
+//! Every class has intervals for the measured qualities; outside of one, its probability falls
+//! like a normal distribution. The intervals are sizes of everyday vehicles and people (sources
+//! at the constants); only the roughness of foliage was read off a recording.
+
+use super::Class;
+
+/// The road users that are told apart, in the order of [`Belief`].
+const ROAD_USERS: [Class; 4] = [
+    Class::Car,
+    Class::Cyclist,
+    Class::Pedestrian,
+    Class::LargeVehicle,
+];
+
+/// What was measured of an object over its life.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Qualities {
+    /// Longer side of what was seen.
+    pub(super) long_m: f64,
+    /// Shorter side.
+    pub(super) short_m: f64,
+    /// Length, once it was seen from end to end.
+    pub(super) whole_m: Option<f64>,
+    /// Width, once it was seen from side to side.
+    pub(super) wide_m: Option<f64>,
+    /// Extent across the direction in which it moves, once that is known.
+    pub(super) across_m: Option<f64>,
+    /// Greatest extent of what is higher than a bonnet or a handlebar, if any of it was seen.
+    pub(super) upper_m: Option<f64>,
+    /// Top above the ground: at least this...
+    pub(super) top_m: f64,
+    /// ...and at most this, which is where the next ray passed over it.
+    pub(super) top_below_m: f64,
+    /// Share of its columns in which it goes on above.
+    pub(super) goes_on: f64,
+    /// How much neighbouring returns jump to and fro.
+    pub(super) roughness_m: f64,
+    /// Highest lasting speed.
+    pub(super) speed_mps: f64,
+    /// Whether it was seen to move.
+    pub(super) moved: bool,
+    /// Distance from the sensor.
+    pub(super) range_m: f64,
+    /// Returns on it.
+    pub(super) points: usize,
+    /// Whether it was cut off structure.
+    pub(super) is_suspect: bool,
+}
+
+/// No single quality decides alone.
+const WORST_LOG: f64 = -8.0;
+/// What is too fast for a bicycle has a motor.
+const MOTOR_LOG: f64 = -2.0;
+
+/// An interval with the standard deviation outside of it.
+struct Within(f64, f64, f64);
+
+impl Within {
+    /// Logarithm of the relative probability of a value.
+    fn log(&self, value: f64) -> f64 {
+        self.log_between(value, value)
+    }
+
+    /// The same for a value that lies somewhere between two bounds.
+    fn log_between(&self, low: f64, high: f64) -> f64 {
+        let Self(from, to, deviation) = *self;
+        let off = (from - high).max(low - to).max(0.0) / deviation;
+        (-0.5 * off * off).max(WORST_LOG)
+    }
+}
+
+/// What is known of a class of road users: sides, top, speed, and how frequent it is.
+struct Profile {
+    long_m: Within,
+    short_m: Within,
+    whole_m: Within,
+    wide_m: Within,
+    across_m: Within,
+    upper_m: Within,
+    top_m: Within,
+    speed_mps: Within,
+    /// How likely it is at least, however fast it moves.
+    faster_log: f64,
+    /// Longest side of what is seen of it from an end, while it moves.
+    end_on_m: f64,
+    log_prior: f64,
+}
+
+/// In the order of [`ROAD_USERS`]. Lengths and widths: cars from the smallest to vans, and for a
+/// rear that is all one sees; bicycles with their riders (FGSV, RASt 2006: 1.9 m by 0.8 m at
+/// most); people; lorries and buses up to an articulated one.
+const PROFILES: [Profile; 4] = [
+    Profile {
+        long_m: Within(1.35, 5.3, 0.2),
+        short_m: Within(0.1, 2.1, 0.15),
+        whole_m: Within(3.1, 5.3, 0.3),
+        wide_m: Within(1.2, 2.15, 0.15),
+        across_m: Within(0.1, 2.15, 0.15),
+        upper_m: Within(0.95, 5.3, 0.12),
+        top_m: Within(1.25, 2.1, 0.12),
+        speed_mps: Within(0.0, 40.0, 2.0),
+        faster_log: WORST_LOG,
+        end_on_m: 1.35,
+        log_prior: -0.7,
+    },
+    Profile {
+        long_m: Within(0.95, 1.95, 0.14),
+        short_m: Within(0.1, 0.85, 0.12),
+        whole_m: Within(0.3, 1.95, 0.15),
+        wide_m: Within(0.1, 0.95, 0.12),
+        across_m: Within(0.1, 0.85, 0.12),
+        upper_m: Within(0.1, 0.95, 0.12),
+        top_m: Within(1.4, 1.95, 0.12),
+        speed_mps: Within(1.9, 8.5, 0.45),
+        faster_log: MOTOR_LOG,
+        end_on_m: 0.4,
+        log_prior: -1.6,
+    },
+    Profile {
+        long_m: Within(0.2, 0.85, 0.09),
+        short_m: Within(0.05, 0.7, 0.1),
+        whole_m: Within(0.1, 0.95, 0.12),
+        wide_m: Within(0.1, 0.95, 0.12),
+        across_m: Within(0.1, 0.85, 0.1),
+        upper_m: Within(0.1, 0.85, 0.1),
+        top_m: Within(1.3, 1.95, 0.12),
+        speed_mps: Within(0.0, 2.3, 0.35),
+        faster_log: WORST_LOG,
+        end_on_m: 0.2,
+        log_prior: -1.6,
+    },
+    Profile {
+        long_m: Within(5.0, 15.0, 1.1),
+        short_m: Within(0.1, 2.8, 0.2),
+        whole_m: Within(5.0, 18.0, 0.5),
+        wide_m: Within(1.5, 2.8, 0.2),
+        across_m: Within(0.1, 2.8, 0.2),
+        upper_m: Within(1.3, 15.0, 0.2),
+        top_m: Within(2.3, 4.0, 0.12),
+        speed_mps: Within(0.0, 30.0, 2.0),
+        faster_log: WORST_LOG,
+        end_on_m: 1.7,
+        log_prior: -1.3,
+    },
+];
+
+/// Structure is as frequent as everything else together, and does not move.
+const STRUCTURE_LOG_PRIOR: f64 = -0.9;
+const STRUCTURE_MOVED_LOG: f64 = -4.5;
+/// A few returns from something that stands are rather a piece of structure, the more so the
+/// fewer they are.
+const FEW: usize = 15;
+const FEW_LOG: f64 = 0.1;
+/// The same for what was cut off structure.
+const SUSPECT_LOG: f64 = 0.8;
+/// Surfaces of vehicles and clothes jump by less than this, foliage by more.
+const SMOOTH_M: Within = Within(0.0, 0.045, 0.018);
+/// Share of columns in which a road user seems to go on above: what stands close behind it.
+const ENDS: Within = Within(0.0, 0.15, 0.15);
+/// Foliage and fences.
+const ROUGH_M: Within = Within(0.05, 1.0, 0.02);
+
+/// Probabilities of the classes, and of being no road user at all.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Belief {
+    road_users: [f64; 4],
+    structure: f64,
+}
+
+impl Belief {
+    /// What is known without any look at it.
+    pub(super) fn unknown() -> Self {
+        let mut belief = Self {
+            road_users: PROFILES.map(|profile| libm::exp(profile.log_prior)),
+            structure: libm::exp(STRUCTURE_LOG_PRIOR),
+        };
+        belief.normalise();
+        belief
+    }
+
+    /// What the qualities alone say.
+    pub(super) fn of(qualities: &Qualities) -> Self {
+        let smooth = SMOOTH_M.log(qualities.roughness_m);
+        // The sides of something far away are seen by a few rays only.
+        let slack_m = 0.004 * qualities.range_m;
+        let road_users = std::array::from_fn(|number| {
+            let profile = &PROFILES[number];
+            let is_thin = matches!(ROAD_USERS[number], Class::Cyclist | Class::Pedestrian);
+            let speed = if qualities.moved {
+                let own = profile.speed_mps.log(qualities.speed_mps);
+                own.max(profile.faster_log)
+            } else if ROAD_USERS[number] == Class::Cyclist {
+                STANDING_CYCLIST_LOG
+            } else {
+                0.0
+            };
+            // A bicycle from behind is as narrow as a person, a lorry as short as it is wide.
+            let shortest_m = if qualities.moved {
+                profile.end_on_m
+            } else {
+                profile.long_m.0
+            };
+            // People side by side are as wide as they are many.
+            let is_group = ROAD_USERS[number] == Class::Pedestrian
+                && qualities.moved
+                && qualities.long_m > profile.long_m.1
+                && qualities.short_m < GROUP_DEPTH_M;
+            let (longest_m, group) = if is_group {
+                (GROUP_WIDTH_M, GROUP_LOG)
+            } else {
+                (0.0, 0.0)
+            };
+            let sized = |own: &Within| Within(own.0, own.1.max(longest_m), own.2);
+            let long_m = Within(shortest_m, profile.long_m.1, profile.long_m.2);
+            // What goes on above the highest layer is rather a house than a vehicle.
+            let endless = if qualities.top_below_m == f64::MAX {
+                ENDLESS_LOG
+            } else {
+                0.0
+            };
+            let ends = ENDS.log(qualities.goes_on);
+            // Posts as high as a person are rarer than posts that are lower or higher.
+            let is_upright = ROAD_USERS[number] == Class::Pedestrian
+                && qualities.points >= MANY_FOR_A_PERSON
+                && profile.top_m.log_between(qualities.top_m, qualities.top_m) == 0.0
+                && qualities.long_m > LEAST_SHOULDERS_M
+                && qualities.top_below_m < profile.top_m.1 + ABOVE_A_PERSON_M;
+            let upright = if is_upright { UPRIGHT_LOG } else { 0.0 };
+            let surface = if is_thin { 0.25 * smooth } else { smooth };
+            // A wall is flat, a vehicle has bumpers, wheels and screens that do not line up, unless
+            // it is a van from behind; walls do not move.
+            let deep_m = if qualities.points >= MANY {
+                &DEEP_M
+            } else {
+                &FLAT_M
+            };
+            let is_flat = !is_thin
+                && !qualities.moved
+                && qualities.points >= FEW
+                && qualities.short_m < deep_m.0;
+            let short = if is_flat {
+                deep_m.log(qualities.short_m)
+            } else {
+                profile.short_m.log(qualities.short_m)
+            };
+            let log = profile.log_prior
+                + sized(&long_m).log_between(qualities.long_m, qualities.long_m + slack_m)
+                + short
+                + group
+                + known(&sized(&profile.whole_m), qualities.whole_m)
+                + known(&sized(&profile.wide_m), qualities.wide_m)
+                + known(&sized(&profile.across_m), qualities.across_m)
+                + known(
+                    &sized(&profile.upper_m),
+                    qualities.upper_m.map(|seen_m| seen_m + slack_m),
+                )
+                + profile
+                    .top_m
+                    .log_between(qualities.top_m, qualities.top_below_m)
+                + speed
+                + surface
+                + endless
+                + ends
+                + upright;
+            libm::exp(log)
+        });
+        let moved = if qualities.moved {
+            STRUCTURE_MOVED_LOG
+        } else {
+            0.0
+        };
+        let few = if qualities.moved {
+            0.0
+        } else {
+            FEW_LOG * FEW.saturating_sub(qualities.points) as f64
+        };
+        let suspect = !qualities.moved && qualities.is_suspect;
+        let moved = moved + few + if suspect { SUSPECT_LOG } else { 0.0 };
+        let rough = 0.3 * ROUGH_M.log(qualities.roughness_m);
+        let mut belief = Self {
+            road_users,
+            structure: libm::exp(STRUCTURE_LOG_PRIOR + moved + rough.max(-0.5)),
+        };
+        belief.normalise();
+        belief
+    }
+
+    fn normalise(&mut self) {
+        let total = self.road_users.iter().sum::<f64>() + self.structure;
+        for probability in &mut self.road_users {
+            *probability /= total;
+        }
+        self.structure /= total;
+    }
+
+    /// Learns from a further look, a share of the way.
+    pub(super) fn learn(&mut self, fresh: &Self, share: f64) {
+        for (probability, fresh) in self.road_users.iter_mut().zip(fresh.road_users) {
+            *probability += share * (fresh - *probability);
+        }
+        self.structure += share * (fresh.structure - self.structure);
+    }
+
+    /// Probability that it is a road user of any class.
+    pub(super) fn road_user(&self) -> f64 {
+        1.0 - self.structure
+    }
+
+    /// Probability, among road users, of a class with the bulk of a car or more.
+    pub(super) fn vehicle(&self) -> f64 {
+        let [car, _, _, large] = self.road_users;
+        (car + large) / self.road_user().max(1e-9)
+    }
+
+    /// The likeliest class and its probability among road users.
+    pub(super) fn class(&self) -> (Class, f64) {
+        /// Below this nobody can tell.
+        const LEAST: f64 = 0.4;
+        let (number, probability) =
+            self.road_users
+                .iter()
+                .enumerate()
+                .fold((0, 0.0), |best, (number, probability)| {
+                    if *probability > best.1 {
+                        (number, *probability)
+                    } else {
+                        best
+                    }
+                });
+        let share = probability / self.road_user().max(1e-9);
+        if share < LEAST {
+            (Class::Unclassified, 1.0 - share)
+        } else {
+            (ROAD_USERS[number], share)
+        }
+    }
+}
+
+/// Logarithm for a quality that may not be known.
+fn known(within: &Within, value: Option<f64>) -> f64 {
+    value.map_or(0.0, |value| within.log(value))
+}
+
+/// Depth of a vehicle's side with all that does not line up, as a few returns show it, and as
+/// many do.
+const FLAT_M: Within = Within(0.25, 3.0, 0.07);
+const DEEP_M: Within = Within(0.6, 3.0, 0.13);
+const MANY: usize = 60;
+/// What speaks for a person where the height is one's, the returns that show it, how wide
+/// shoulders are at least, and how far above a person a ray may pass that shows the height.
+const UPRIGHT_LOG: f64 = 0.6;
+const MANY_FOR_A_PERSON: usize = 10;
+const LEAST_SHOULDERS_M: f64 = 0.35;
+const ABOVE_A_PERSON_M: f64 = 0.65;
+/// Of a road user that reaches out of the sensor's view.
+const ENDLESS_LOG: f64 = -1.5;
+/// Greatest width and depth of people who walk side by side, and how much rarer they are.
+const GROUP_WIDTH_M: f64 = 2.3;
+const GROUP_DEPTH_M: f64 = 0.8;
+const GROUP_LOG: f64 = -1.0;
+/// Bicycles that stand have mostly no rider.
+const STANDING_CYCLIST_LOG: f64 = -1.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAR: Qualities = Qualities {
+        long_m: 4.2,
+        short_m: 1.6,
+        whole_m: None,
+        wide_m: None,
+        across_m: None,
+        upper_m: Some(1.4),
+        top_m: 1.4,
+        top_below_m: 1.7,
+        goes_on: 0.0,
+        roughness_m: 0.02,
+        speed_mps: 0.0,
+        moved: false,
+        range_m: 15.0,
+        points: 60,
+        is_suspect: false,
+    };
+
+    #[test]
+    fn everyday_road_users_are_told_apart() {
+        let walker = Qualities {
+            long_m: 0.6,
+            short_m: 0.4,
+            upper_m: Some(0.5),
+            top_m: 1.6,
+            top_below_m: 1.9,
+            speed_mps: 1.4,
+            moved: true,
+            ..CAR
+        };
+        let rider = Qualities {
+            long_m: 1.7,
+            speed_mps: 4.2,
+            ..walker
+        };
+        let from_behind = Qualities {
+            speed_mps: 4.2,
+            ..walker
+        };
+        let bus = Qualities {
+            long_m: 9.0,
+            top_m: 2.6,
+            top_below_m: 3.2,
+            ..CAR
+        };
+        for (qualities, class) in [
+            (CAR, Class::Car),
+            (walker, Class::Pedestrian),
+            (rider, Class::Cyclist),
+            (from_behind, Class::Cyclist),
+            (bus, Class::LargeVehicle),
+        ] {
+            let belief = Belief::of(&qualities);
+            assert_eq!(belief.class().0, class, "{belief:?}");
+            assert!(belief.road_user() > 0.4, "{belief:?}");
+        }
+    }
+
+    #[test]
+    fn a_guard_rail_along_which_one_drives_is_no_car() {
+        // The piece of it that is lit drives along, too.
+        let car = Qualities {
+            short_m: 0.4,
+            upper_m: None,
+            top_m: 0.75,
+            top_below_m: 1.5,
+            wide_m: Some(1.7),
+            across_m: Some(1.7),
+            speed_mps: 14.0,
+            moved: true,
+            points: 8,
+            ..CAR
+        };
+        let rail = Qualities {
+            wide_m: Some(0.4),
+            across_m: Some(0.4),
+            ..car
+        };
+        let [car, rail] = [car, rail].map(|qualities| Belief::of(&qualities).road_user());
+        assert!(car > 0.9 && rail < 0.2, "{car} {rail}");
+    }
+
+    #[test]
+    fn what_drives_may_be_flat_and_shows_only_its_rear() {
+        let van = Qualities {
+            long_m: 2.0,
+            short_m: 0.12,
+            upper_m: Some(1.9),
+            top_m: 2.35,
+            top_below_m: 2.5,
+            wide_m: Some(2.0),
+            speed_mps: 4.0,
+            moved: true,
+            points: 740,
+            ..CAR
+        };
+        let wall = Qualities {
+            speed_mps: 0.0,
+            moved: false,
+            ..van
+        };
+        let [van, wall] = [van, wall].map(|qualities| Belief::of(&qualities));
+        assert!(van.road_user() > 0.9 && van.vehicle() > 0.9, "{van:?}");
+        assert!(wall.road_user() < 0.2, "{wall:?}");
+    }
+
+    #[test]
+    fn a_motorcyclist_is_as_fast_as_a_car() {
+        let motorcyclist = Qualities {
+            long_m: 1.1,
+            short_m: 0.5,
+            upper_m: Some(0.6),
+            top_m: 1.5,
+            top_below_m: 2.1,
+            speed_mps: 14.0,
+            moved: true,
+            points: 15,
+            ..CAR
+        };
+        let belief = Belief::of(&motorcyclist);
+        assert_eq!(belief.class().0, Class::Cyclist, "{belief:?}");
+        assert!(belief.road_user() > 0.5, "{belief:?}");
+    }
+
+    #[test]
+    fn three_people_side_by_side_are_no_wall() {
+        let three = Qualities {
+            long_m: 1.8,
+            short_m: 0.46,
+            whole_m: Some(0.46),
+            wide_m: Some(1.8),
+            across_m: Some(1.8),
+            upper_m: Some(1.6),
+            top_m: 1.55,
+            top_below_m: 2.0,
+            speed_mps: 1.4,
+            moved: true,
+            points: 50,
+            ..CAR
+        };
+        let belief = Belief::of(&three);
+        assert_eq!(belief.class().0, Class::Pedestrian, "{belief:?}");
+        assert!(belief.road_user() > 0.5, "{belief:?}");
+    }
+
+    #[test]
+    fn who_stands_is_told_from_a_post_by_the_shoulders() {
+        let somebody = Qualities {
+            long_m: 0.49,
+            short_m: 0.18,
+            whole_m: Some(0.49),
+            upper_m: Some(0.55),
+            top_m: 1.71,
+            top_below_m: 2.22,
+            roughness_m: 0.03,
+            points: 24,
+            ..CAR
+        };
+        let post = Qualities {
+            long_m: 0.2,
+            whole_m: Some(0.2),
+            upper_m: Some(0.2),
+            ..somebody
+        };
+        let [somebody, post] = [somebody, post].map(|qualities| Belief::of(&qualities).road_user());
+        assert!(somebody > 0.5 && post < 0.5, "{somebody} {post}");
+    }
+
+    #[test]
+    fn hedges_walls_and_poles_are_no_road_users() {
+        let hedge = Qualities {
+            roughness_m: 0.2,
+            short_m: 0.8,
+            ..CAR
+        };
+        let wall = Qualities {
+            long_m: 9.0,
+            top_m: 1.2,
+            top_below_m: 1.4,
+            ..CAR
+        };
+        let pole = Qualities {
+            long_m: 0.2,
+            short_m: 0.1,
+            upper_m: Some(0.2),
+            top_m: 3.0,
+            top_below_m: 3.2,
+            ..CAR
+        };
+        for qualities in [hedge, wall, pole] {
+            let belief = Belief::of(&qualities);
+            assert!(belief.road_user() < 0.2, "{qualities:?} {belief:?}");
+        }
+    }
+}
