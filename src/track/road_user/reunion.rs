@@ -22,6 +22,8 @@ const SPEED_SHARE: f64 = 0.4;
 const GROWTH_M: f64 = 1.0;
 /// Standard deviation from which on nothing is known of a velocity.
 const UNKNOWN_MPS: f64 = 1.5;
+/// Time within which something new does not show whether it stands: its box grows meanwhile.
+const NEW_S: f64 = 0.8;
 /// Share of the returns before below which a look says little of where something is: they may be
 /// of what is beside it...
 const CLEAR: f64 = 0.5;
@@ -51,6 +53,14 @@ impl Parting {
             standing: estimate.standing,
             points: points as f64,
             at,
+        }
+    }
+
+    /// The same of which the velocity is not known.
+    fn of_unknown_velocity(self) -> Self {
+        Self {
+            deviation_mps: f64::INFINITY,
+            ..self
         }
     }
 
@@ -146,7 +156,13 @@ impl Track {
         if !lost.parted.moves() && !is_alike {
             return None;
         }
-        self.parted.off_from_m(&lost.parted, length_m)
+        let is_new = !self.moves && (self.time - self.first_seen).seconds() < NEW_S;
+        let own = if is_new {
+            self.parted.of_unknown_velocity()
+        } else {
+            self.parted
+        };
+        own.off_from_m(&lost.parted, length_m)
     }
 
     /// Whether nothing or hardly anything is seen of it, though others know it.
@@ -219,13 +235,11 @@ mod tests {
     fn who_is_too_new_to_have_a_velocity_is_looked_for_straight_on_and_on_the_arc() {
         let car = |angle_rad| on_circle(11.0, 8.0, angle_rad);
         let parted = car(0.0);
-        let unknown = |seen: Parting| Parting {
+        let on_arc = Parting {
             velocity_mps: Vector2::zeros(),
-            deviation_mps: 4.0,
             standing: 0.6,
-            ..seen
+            ..car(1.0).of_unknown_velocity()
         };
-        let on_arc = unknown(car(1.0));
         let gap_s = (on_arc.at - parted.at).seconds();
         let ahead = Parting {
             position_m: parted.position_m + parted.velocity_mps * gap_s,
@@ -271,6 +285,36 @@ mod tests {
         assert!(!is_missed_after(spots.len(), 1));
         assert!(is_missed_after(3, 2));
         assert!(!is_missed_after(spots.len(), 3));
+    }
+
+    #[test]
+    fn what_is_new_and_seems_to_stand_may_be_who_was_lost_as_long_as_it_is_new() {
+        let scan = scan_of(1800, |column, layer| match column {
+            0..40 if (5..8).contains(&layer) => 1500,
+            _ => 0,
+        });
+        let (spots, begin) = (spots_of(&scan), scan.time());
+        let look = Look::at(&spots, &scan, Vector2::zeros());
+        let track = |id| Track::new(id, false, &spots, &look, begin, 0.0, &mut vec![]);
+        let mut lost = track(1);
+        lost.parted = Parting {
+            at: begin,
+            ..at(0.0)
+        };
+        let is_found_after = |age_s: f64| {
+            let mut seen = track(2);
+            seen.time = begin + Span::from_seconds(1.5 + age_s);
+            seen.first_seen = begin + Span::from_seconds(1.5);
+            seen.parted = Parting {
+                position_m: lost.parted.position_m + lost.parted.velocity_mps * (1.5 + age_s),
+                velocity_mps: Vector2::zeros(),
+                standing: 0.9,
+                at: seen.time,
+                ..lost.parted
+            };
+            seen.off_from_m(&lost).is_some()
+        };
+        assert!(is_found_after(0.4) && !is_found_after(1.2));
     }
 
     #[test]
