@@ -81,9 +81,9 @@ struct Profile {
     upper_m: Within,
     top_m: Within,
     speed_mps: Within,
-    /// How likely it is at least, however fast it moves.
+    /// Logarithm of the probability that is left of it at least, however much faster it moves.
     faster_log: f64,
-    /// Longest side of what is seen of it from an end, while it moves.
+    /// Least that the longer side of what is seen may be while it moves: it may be seen from an end.
     end_on_m: f64,
     log_prior: f64,
 }
@@ -190,7 +190,11 @@ impl Belief {
             let is_thin = matches!(ROAD_USERS[number], Class::Cyclist | Class::Pedestrian);
             let speed = if qualities.moved {
                 let own = profile.speed_mps.log(qualities.speed_mps);
-                own.max(profile.faster_log)
+                if qualities.speed_mps > profile.speed_mps.1 {
+                    own.max(profile.faster_log)
+                } else {
+                    own
+                }
             } else if ROAD_USERS[number] == Class::Cyclist {
                 STANDING_CYCLIST_LOG
             } else {

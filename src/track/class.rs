@@ -7,9 +7,9 @@ pub enum Class {
     Unclassified,
     /// A passenger car or a van.
     Car,
-    /// A bicycle with its rider.
+    /// A bicycle or a motorcycle with its rider.
     Cyclist,
-    /// Somebody on foot.
+    /// Somebody on foot, or a few side by side who cannot be told apart.
     Pedestrian,
     /// A lorry or a bus.
     LargeVehicle,

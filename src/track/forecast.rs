@@ -32,6 +32,12 @@ impl Forecast {
             rests: track.rests(),
         }
     }
+
+    /// Whether a place, in the frame of the patches, can be of the track.
+    pub(super) fn reaches(&self, at_m: [f32; 2]) -> bool {
+        let off_m = [0, 1].map(|axis| at_m[axis] - self.middle_m[axis]);
+        self.outline.off_edge_m(off_m) <= self.margin_m
+    }
 }
 
 /// Where all tracks are expected, by their numbers.
@@ -60,7 +66,7 @@ impl Forecasts {
     /// Whether one of several people who stand side by side is the one that is the nearest to a
     /// track.
     pub(super) fn is_nearest(&self, track: usize, patches: &[Patch], number: usize) -> bool {
-        let [before, after] = patches[number].others;
+        let [before, after] = patches[number].beside;
         let [x, y] = self.forecasts[track].middle_m;
         let off_m = |number: usize| {
             let [east_m, north_m] = patches[number].bounds.middle_m();

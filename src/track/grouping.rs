@@ -37,9 +37,9 @@ pub(super) struct Grouping {
     /// The group that each one joins.
     target: Vec<usize>,
     /// How many large patches each track has.
-    held: Vec<u32>,
+    large_patches: Vec<u32>,
     /// Group numbers of people who are told apart.
-    several: Vec<u32>,
+    people: Vec<u32>,
     /// Group numbers of what was cut off structure, ascending.
     suspects: Vec<u32>,
 }
@@ -105,8 +105,8 @@ impl Grouping {
     }
 
     /// Whether a track has several things in its place that do not touch.
-    pub(super) fn holds_several(&self, track: usize) -> bool {
-        self.held[track] > 1
+    pub(super) fn holds_things_apart(&self, track: usize) -> bool {
+        self.large_patches[track] > 1
     }
 
     /// Whether a group was cut off structure.
@@ -120,9 +120,9 @@ impl Grouping {
         let origin_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
         self.forecasts.take(tracks, origin_m);
         self.suspects.clear();
-        self.several.clear();
-        self.held.clear();
-        self.held.resize(tracks.len(), 0);
+        self.people.clear();
+        self.large_patches.clear();
+        self.large_patches.resize(tracks.len(), 0);
         self.spots.clear();
         for number in 0..self.placer.patches().len() {
             let patch = self.placer.patches()[number];
@@ -131,7 +131,7 @@ impl Grouping {
                 self.suspects.push(own);
             }
             let is_whole = patch.can_be_road_user(parameters);
-            self.find_near(number, own, tracks);
+            self.find_near(number, tracks);
             if self.near.is_empty() && !is_whole {
                 continue;
             }
@@ -139,14 +139,21 @@ impl Grouping {
             let placed = self.placer.placed(&patch);
             self.claims
                 .settle(placed, &self.near, &self.forecasts, is_whole);
-            let owner = self.owner(&patch, is_whole, tracks, scene.scan.time());
+            if patch.is_one_of_several() {
+                let owners = self.claims.owners().flatten();
+                let people = owners.filter(|track| !tracks[*track].is_vehicle());
+                self.people.extend(people.map(|track| track as u32));
+                self.people.push(own);
+            }
+            let owner = is_whole.then(|| self.owner(&patch, tracks, scene.scan.time()));
+            let owner = owner.flatten();
             let owns = owner.map(|(track, _)| track);
             let rests = |track: usize| self.forecasts.of(track).rests;
             if owns.is_some_and(rests) {
                 continue;
             }
             if let Some(track) = owns.filter(|_| patch.diagonal_m() > LARGE_M) {
-                self.held[track] += 1;
+                self.large_patches[track] += 1;
             }
             for (placed, track) in placed.iter().zip(self.claims.owners()) {
                 let group = track.map(|track| track as u32).or(is_whole.then_some(own));
@@ -172,44 +179,37 @@ impl Grouping {
         }
     }
 
-    /// Finds the tracks that can have returns of a patch, which has a group number of its own.
-    fn find_near(&mut self, number: usize, own: u32, tracks: &[Track]) {
+    /// Finds the tracks that can have returns of a patch.
+    fn find_near(&mut self, number: usize, tracks: &[Track]) {
         let patches = self.placer.patches();
         let patch = &patches[number];
         self.near.clear();
         self.near.extend(self.forecasts.near(patch));
+        let forecasts = &self.forecasts;
         if patch.is_one_of_several() {
             // Each of several people is somebody, unless a car was taken for them.
-            let is_vehicle = |track: &usize| tracks[*track].is_vehicle();
-            let forecasts = &self.forecasts;
-            self.near
-                .retain(|track| is_vehicle(track) || forecasts.is_nearest(*track, patches, number));
-            let people = self.near.iter().filter(|track| !is_vehicle(track));
-            self.several.push(own);
-            self.several.extend(people.map(|track| *track as u32));
+            self.near.retain(|track| {
+                tracks[*track].is_vehicle() || forecasts.is_nearest(*track, patches, number)
+            });
         }
-        let top_m = f64::from(patch.bounds.top_m);
-        let is_lorry = |track: &Track| track.is_published && track.may_be_lorry(top_m);
-        if self.near.iter().any(|track| is_lorry(&tracks[*track])) {
+        let (top_m, middle_m) = (f64::from(patch.bounds.top_m), patch.bounds.middle_m());
+        let is_lorry = |track: &usize| {
+            let lorry = &tracks[*track];
+            lorry.is_published
+                && lorry.may_be_lorry(top_m)
+                && forecasts.of(*track).reaches(middle_m)
+        };
+        if self.near.iter().any(is_lorry) {
             // Pieces of it are no objects.
             self.near.retain(|track| tracks[*track].is_published);
         }
     }
 
     /// The track to which all of a patch belongs, and whether it does so at any size. A patch that
-    /// reaches out of the only box belongs to it as long as the whole can be one object; several
-    /// tracks that are all young may be pieces of something long that moves by more than their
-    /// boxes from one revolution to the next: all of it goes on as the first of them.
-    fn owner(
-        &self,
-        patch: &Patch,
-        is_whole: bool,
-        tracks: &[Track],
-        now: Time,
-    ) -> Option<(usize, bool)> {
-        if !is_whole {
-            return None;
-        }
+    /// reaches out of the only box belongs to it as long as the whole can be one object. Several
+    /// tracks beside each other that are all young may be pieces of something long that moves by
+    /// more than their boxes from one revolution to the next: all of it goes on as the first one.
+    fn owner(&self, patch: &Patch, tracks: &[Track], now: Time) -> Option<(usize, bool)> {
         let is_long = patch.diagonal_m() > LONG_M && patch.bounds.top_m > LOWEST_LONG_M;
         let are_young = || self.near.iter().all(|track| tracks[*track].is_young(now));
         if is_long && self.near.len() > 1 && are_young() {
@@ -270,7 +270,7 @@ impl Grouping {
             if spots.len() < FEWEST_RETURNS && claimed_by.is_none() {
                 continue;
             }
-            let is_one_of_several = self.several.contains(&number);
+            let is_one_of_several = self.people.contains(&number);
             let look = match own {
                 [
                     Stretch {

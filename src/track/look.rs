@@ -101,10 +101,12 @@ impl Look {
     }
 }
 
+/// Difference of ranges of two returns of a column, one above the other, within which they are of
+/// the same thing.
+pub(super) const SAME_M: f32 = 0.8;
+
 /// The return directly above one, if it is there and of the same thing.
 pub(super) fn same_above(scan: &Scan, point: usize) -> Option<usize> {
-    /// Difference of ranges within which it is.
-    const SAME_M: f32 = 0.8;
     let ranges_m = scan.range_m();
     let above = point + 1;
     let is_same = scan.layer(above) > 0

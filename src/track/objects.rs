@@ -185,12 +185,12 @@ impl ObjectTracker {
             .zip(self.assigner.pairs())
             .enumerate()
         {
-            match pair.map(|number| &self.grouping.groups()[number]) {
+            match pair.map(|group| &self.grouping.groups()[group]) {
                 Some(group) => {
                     let spots = self.grouping.spots(group);
                     let floor_z_m = floor_z_m(spots, scene);
                     track.measure(spots, &group.look, end, floor_z_m, &mut self.outline);
-                    if self.grouping.holds_several(number) {
+                    if self.grouping.holds_things_apart(number) {
                         track.give_way();
                     }
                 }

@@ -1,8 +1,10 @@
 //! Returns of one revolution that may be road users, placed, cluster by cluster and part by part.
 
 use super::floor::Floor;
+use super::look::SAME_M;
 use super::placing::{Bounds, Placed, Placing};
 use super::{Scene, TrackParameters, people};
+use crate::cloud::MAX_LAYERS;
 use crate::cluster::Clusters;
 use crate::float::{bounds_of, greatest};
 
@@ -19,7 +21,7 @@ pub(super) struct Patch {
     /// It was cut off something that is no road user, and may be a piece of that.
     pub(super) is_suspect: bool,
     /// One of several people: their patches follow each other, so many before this one and after.
-    pub(super) others: [usize; 2],
+    pub(super) beside: [usize; 2],
 }
 
 impl Patch {
@@ -31,7 +33,7 @@ impl Patch {
 
     /// Whether it is one of several people side by side.
     pub(super) fn is_one_of_several(&self) -> bool {
-        self.others != [0; 2]
+        self.beside != [0; 2]
     }
 
     /// Whether it can be a road user as a whole.
@@ -61,7 +63,7 @@ pub(super) struct Placer {
     parts: Vec<Part>,
     /// The part of each return.
     part_of: Vec<u32>,
-    /// The patches before people were told apart, and where they are.
+    /// The patches before people were told apart, and where one of them is cut.
     former: Vec<Patch>,
     cuts: Vec<usize>,
 }
@@ -72,7 +74,7 @@ struct Part {
     /// Cells, and those above which there is more.
     cells: u32,
     covered: u32,
-    /// What is higher does not belong to it.
+    /// What is higher does not belong to it, but for the roof of a van.
     cut_m: f32,
     /// Where its returns begin; later where they end.
     place: usize,
@@ -110,10 +112,9 @@ const ABOVE_CUT_M: f32 = 0.8;
 const ABOVE_CUT_PER_M: f32 = 0.07;
 /// Share of a part's cells above which there is more, from which on it is a wall or a trunk.
 const GOES_ON: f64 = 0.5;
-/// Height of vans.
+/// Greatest height of vans: what is above the cut and goes on from below belongs to what is below if
+/// the whole cluster is lower.
 const VAN_TOP_M: f32 = 3.0;
-/// Difference of ranges within which what is above the cut goes on from what is below.
-const SAME_M: f32 = 0.8;
 /// Smaller clusters are not divided.
 const SMALLEST_DIVIDED_M: f64 = 1.0;
 
@@ -146,7 +147,7 @@ impl Placer {
                 bounds,
                 goes_on: false,
                 is_suspect: false,
-                others: [0; 2],
+                beside: [0; 2],
             };
             if whole.diagonal_m() < SMALLEST_DIVIDED_M {
                 self.placed.extend(self.cluster.iter());
@@ -170,8 +171,12 @@ impl Placer {
         self.patches.clear();
         for patch in &self.former {
             let placed = &self.placed[patch.begin..patch.end];
-            people::cuts(placed, &patch.bounds, scene.scan, &mut self.cuts);
-            if self.cuts.is_empty() || patch.goes_on {
+            if patch.goes_on {
+                self.cuts.clear();
+            } else {
+                people::cuts(placed, &patch.bounds, scene.scan, &mut self.cuts);
+            }
+            if self.cuts.is_empty() {
                 self.patches.push(*patch);
                 continue;
             }
@@ -183,7 +188,7 @@ impl Placer {
                     begin,
                     end,
                     bounds: Bounds::of(&self.placed[begin..end]),
-                    others: [number, count - number],
+                    beside: [number, count - number],
                     ..*patch
                 });
                 begin = end;
@@ -267,7 +272,8 @@ impl Placer {
                 let (point_below, part_below, range_below_m) = below;
                 let number = self.floor.name(*place);
                 let goes_on = top_m < VAN_TOP_M
-                    && point_below.wrapping_add(1) == *point
+                    && *above_m > CUT_M
+                    && is_below(point_below, *point)
                     && (range_m - range_below_m).abs() < SAME_M;
                 let part = if *above_m <= self.parts[number as usize].cut_m {
                     number
@@ -306,11 +312,16 @@ impl Placer {
                     bounds: Bounds::of(&self.placed[begin..part.place]),
                     goes_on: is_too_tall && part.goes_on(),
                     is_suspect: false,
-                    others: [0; 2],
+                    beside: [0; 2],
                 });
             }
         }
     }
+}
+
+/// Whether a point is the next one below another in its column.
+fn is_below(below: u32, point: u32) -> bool {
+    !point.is_multiple_of(MAX_LAYERS as u32) && below.wrapping_add(1) == point
 }
 
 /// Whether a return may be a road user's below the height at which trees and roofs are cut off,

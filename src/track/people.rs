@@ -1,4 +1,5 @@
-//! People side by side: a cluster cannot tell their shoulders apart, but shows their heads.
+//! People side by side: a cluster cannot tell their shoulders apart, but shows their heads, if the
+//! same layer meets all of them.
 
 use super::placing::{Bounds, Placed};
 use crate::cloud::Scan;
@@ -11,6 +12,8 @@ const TALLEST_M: f32 = 2.1;
 const WIDEST_HEAD_M: f32 = 0.5;
 /// Gap between two heads, and distance between their middles.
 const LEAST_GAP_M: f32 = 0.12;
+/// From column to column of one head; the return of one in between may be missing.
+const MISSED: usize = 2;
 const LEAST_APART_M: f32 = 0.35;
 const MOST_APART_M: f32 = 1.0;
 /// Room that each takes up at most, and how much more all of them.
@@ -55,7 +58,9 @@ pub(super) fn cuts(placed: &[Placed], bounds: &Bounds, scan: &Scan, cuts: &mut V
     for top in tops {
         let (column, at_m) = (column_of(top), top.at_m);
         match heads[count.max(1) - 1].as_mut() {
-            Some(head) if distance_m(head.to_m, at_m) < LEAST_GAP_M => {
+            Some(head)
+                if distance_m(head.to_m, at_m) < LEAST_GAP_M || column - head.last <= MISSED =>
+            {
                 (head.last, head.to_m) = (column, at_m);
             }
             _ if count == MOST_PEOPLE || top.above_m < LOWEST_HEAD_M => return,
@@ -70,17 +75,19 @@ pub(super) fn cuts(placed: &[Placed], bounds: &Bounds, scan: &Scan, cuts: &mut V
             }
         }
     }
-    let are_heads = heads
-        .iter()
-        .flatten()
-        .all(|head| distance_m(head.from_m, head.to_m) < WIDEST_HEAD_M);
+    let heads = || heads.iter().flatten();
+    let are_heads = heads().all(|head| distance_m(head.from_m, head.to_m) < WIDEST_HEAD_M);
     if count < 2 || !are_heads || long_m > ROOM_M * count as f32 + MORE_M {
         return;
     }
-    for pair in heads[..count].windows(2) {
-        let [Some(one), Some(next)] = pair else {
-            return;
-        };
+    let is_over_seam =
+        |first: &Head, last: &Head| distance_m(last.to_m, first.from_m) < LEAST_GAP_M;
+    if let (Some(first), Some(last)) = (heads().next(), heads().next_back())
+        && is_over_seam(first, last)
+    {
+        return;
+    }
+    for (one, next) in heads().zip(heads().skip(1)) {
         let apart_m = distance_m(one.middle_m(), next.middle_m());
         if !(LEAST_APART_M..MOST_APART_M).contains(&apart_m) {
             cuts.clear();
@@ -110,7 +117,11 @@ mod tests {
                 (4..).contains(&layer) && top_layer(column).is_some_and(|top| layer <= top);
             u16::from(is_met) * 1000
         });
-        let placed: Vec<Placed> = spots_of(&scan)
+        cuts_in(&scan)
+    }
+
+    fn cuts_in(scan: &Scan) -> Vec<usize> {
+        let placed: Vec<Placed> = spots_of(scan)
             .iter()
             .map(|spot| Placed {
                 at_m: spot.at_m,
@@ -120,7 +131,7 @@ mod tests {
             })
             .collect();
         let mut found = vec![];
-        cuts(&placed, &Bounds::of(&placed), &scan, &mut found);
+        cuts(&placed, &Bounds::of(&placed), scan, &mut found);
         found
     }
 
@@ -167,5 +178,22 @@ mod tests {
             _ => None,
         };
         assert!(cuts_of(low).is_empty());
+    }
+
+    #[test]
+    fn one_head_is_one_though_a_return_is_missing_or_the_seam_of_the_sweep_parts_it() {
+        // At 20 m, where two columns are farther apart than two heads may be.
+        let scan = scan_of(1800, |column, layer| match column {
+            107 if layer == 7 => 0,
+            100..114 if (4..8).contains(&layer) => 2000,
+            _ => 0,
+        });
+        assert!(cuts_in(&scan).is_empty());
+        let (left, right) = (person(100), person(115));
+        let over_seam = |column: usize| {
+            let column = (column + 108) % 1800;
+            left(column).or(right(column))
+        };
+        assert!(cuts_of(over_seam).is_empty());
     }
 }

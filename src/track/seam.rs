@@ -1,4 +1,4 @@
-//! What drives along with the sensor over the seam of the sweep.
+//! What moves over the seam of the sweep.
 //!
 //! The first columns of a revolution and the last ones lie beside each other, and are a revolution
 //! apart: a vehicle straight ahead is seen in two halves, of which one has driven on by metres

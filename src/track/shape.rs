@@ -131,16 +131,17 @@ impl Shape {
             } else {
                 SHRINK
             };
+            let is_whole = view.is_whole()[axis];
             let is_too_wide = axis == 1 && self.seen_m[1] > self.widest_m();
-            let is_thin = axis == 1 && view.is_whole()[1] && extent[0] > LONG_M;
+            let is_thin = axis == 1 && is_whole && extent[0] > LONG_M;
             let gain = if look.is_one_of_several {
+                // What was known is the size of all of them.
                 1.0
             } else if (is_too_wide || is_thin) && fresh_m < self.seen_m[1] {
                 CORRECT
             } else {
                 gain
             };
-            let is_whole = view.is_whole()[axis];
             if fresh_m > self.seen_m[axis] || is_whole || is_too_wide || look.is_one_of_several {
                 self.seen_m[axis] += gain * (fresh_m - self.seen_m[axis]);
             }

@@ -42,7 +42,7 @@ const LONGEST_M: f64 = 18.75;
 /// Returns below which an object may be no cluster in the next revolution.
 const SPARSE: usize = 16;
 
-/// Time for which hardly anything is known of something new.
+/// Time within which what nobody knows of may turn out to be a piece of something.
 const YOUNG_S: f64 = 1.6;
 
 /// Speed from which an object counts as moving.
@@ -213,9 +213,9 @@ impl Track {
         self.moves && self.shape.front_known && self.belief.vehicle() > 0.5
     }
 
-    /// Whether hardly anything is known of it.
+    /// Whether it may turn out to be a piece of something.
     pub(super) fn is_young(&self, now: Time) -> bool {
-        !self.is_published && (now - self.first_seen).seconds() < YOUNG_S
+        !self.is_published && !self.rests && (now - self.first_seen).seconds() < YOUNG_S
     }
 
     /// Whether it is rather a vehicle than anything else on the road.

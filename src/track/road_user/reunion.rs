@@ -1,5 +1,7 @@
 //! A road user of which nothing was left, and which is seen again.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Rotation2, Vector2};
 
 use super::{MOVING_MPS, Track};
@@ -56,6 +58,11 @@ impl Parting {
         }
     }
 
+    /// Whether its velocity is known.
+    fn has_velocity(&self) -> bool {
+        self.deviation_mps < UNKNOWN_MPS
+    }
+
     /// The same of which the velocity is not known.
     fn of_unknown_velocity(self) -> Self {
         Self {
@@ -87,7 +94,7 @@ impl Parting {
     /// velocity to this one; `None` if that is too far, or if the velocities do not go together.
     fn off_from_m(&self, parted: &Self, length_m: f64) -> Option<f64> {
         let gap_s = (self.at - parted.at).seconds();
-        if self.deviation_mps < UNKNOWN_MPS {
+        if self.has_velocity() {
             if !self.goes_together_with(parted, gap_s) {
                 return None;
             }
@@ -95,7 +102,8 @@ impl Parting {
         }
         // As long as its own velocity is not known, the other one went straight on or went on to
         // turn.
-        let turned = Rotation2::new(parted.yaw_rate_radps * gap_s) * parted.velocity_mps;
+        let turn_rad = (parted.yaw_rate_radps * gap_s).clamp(-PI, PI);
+        let turned = Rotation2::new(turn_rad) * parted.velocity_mps;
         let ends = [parted.velocity_mps, turned];
         let off_m = ends.map(|end_mps| self.off_arc_m(parted, end_mps, gap_s, length_m));
         off_m.into_iter().flatten().min_by(f64::total_cmp)
@@ -151,17 +159,17 @@ impl Track {
         if !is_in_time || !is_apart || self.shape.seen_m[0] > length_m + GROWTH_M {
             return None;
         }
-        // What moves tells by its speed whether it is the same.
-        let is_alike = (self.belief.vehicle() > 0.5) == (lost.belief.vehicle() > 0.5);
-        if !lost.parted.moves() && !is_alike {
-            return None;
-        }
         let is_new = !self.moves && (self.time - self.first_seen).seconds() < NEW_S;
         let own = if is_new {
             self.parted.of_unknown_velocity()
         } else {
             self.parted
         };
+        // What moves tells by its speed whether it is the same.
+        let tells = lost.parted.moves() && own.has_velocity();
+        if !tells && self.is_vehicle() != lost.is_vehicle() {
+            return None;
+        }
         own.off_from_m(&lost.parted, length_m)
     }
 
