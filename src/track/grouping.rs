@@ -145,8 +145,9 @@ impl Grouping {
                 self.people.extend(people.map(|track| track as u32));
                 self.people.push(own);
             }
-            let owner = is_whole.then(|| self.owner(&patch, tracks, scene.scan.time()));
-            let owner = owner.flatten();
+            let owner = is_whole
+                .then(|| self.owner(&patch, tracks, scene.scan.time()))
+                .flatten();
             let owns = owner.map(|(track, _)| track);
             let rests = |track: usize| self.forecasts.of(track).rests;
             if owns.is_some_and(rests) {

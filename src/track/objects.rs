@@ -405,11 +405,13 @@ mod tests {
                 u16::from(is_met) * (100.0 * range_m) as u16
             });
             see(&mut tracker, &later(&scan, 0.1 * f64::from(revolution)));
+            if revolution >= 3 {
+                let [car] = tracker.objects() else {
+                    panic!("{:?}", tracker.objects());
+                };
+                assert!(car.id == 0 && (car.speed_mps - 33.0).abs() < 2.0, "{car:?}");
+            }
         }
-        let [car] = tracker.objects() else {
-            panic!("{:?}", tracker.objects());
-        };
-        assert!(car.id == 0 && (car.speed_mps - 33.0).abs() < 2.0, "{car:?}");
     }
 
     #[test]

@@ -10,13 +10,14 @@ const LOWEST_HEAD_M: f32 = 1.5;
 const TALLEST_M: f32 = 2.1;
 /// Widest head, with a hat or a hood.
 const WIDEST_HEAD_M: f32 = 0.5;
-/// Gap between two heads, and distance between their middles.
+/// Narrowest gap between two heads.
 const LEAST_GAP_M: f32 = 0.12;
-/// From column to column of one head; the return of one in between may be missing.
-const MISSED: usize = 2;
+/// How far apart the middles of two heads are that walk side by side.
 const LEAST_APART_M: f32 = 0.35;
 const MOST_APART_M: f32 = 1.0;
-/// Room that each takes up at most, and how much more all of them.
+/// From column to column of one head; the return of one in between may be missing.
+const MISSED: usize = 2;
+/// Room that each takes up at most, and how much more all of them together.
 const ROOM_M: f32 = 0.75;
 const MORE_M: f32 = 0.2;
 /// More do not walk side by side.
@@ -171,6 +172,17 @@ mod tests {
             _ => None,
         };
         assert!(cuts_of(screens).is_empty());
+        // Where shoulders would touch, but as wide as a box, or farther apart than people stand.
+        let of = |heads: [std::ops::Range<usize>; 2]| {
+            move |column: usize| match column {
+                _ if heads.iter().any(|head| head.contains(&column)) => Some(7),
+                100..132 => Some(6),
+                _ => None,
+            }
+        };
+        assert!(!cuts_of(of([102..114, 118..130])).is_empty());
+        assert!(cuts_of(of([100..116, 120..132])).is_empty());
+        assert!(cuts_of(of([100..101, 131..132])).is_empty());
         // What is lower than a head is no head.
         let low = |column: usize| match column {
             105..110 | 120..125 => Some(5),

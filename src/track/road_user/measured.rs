@@ -99,7 +99,7 @@ impl Track {
         if estimate.standing < 0.3 && speed_mps > MOVING_MPS && speed_mps > 2.0 * deviation_mps {
             let course_rad = libm::atan2(estimate.velocity_mps.y, estimate.velocity_mps.x);
             // What is small turns on the spot; a vehicle must show clearly where it goes.
-            let least_mps = if self.belief.vehicle() > 0.5 {
+            let least_mps = if self.is_vehicle() {
                 FAST_MPS
             } else {
                 MOVING_MPS

@@ -30,7 +30,8 @@ const VEHICLE_BIRTH_MPS: f64 = 14.0;
 /// Noise of a box's middle beside that of its edges, because its shape is not a box.
 const MIDDLE_M: f64 = 0.08;
 
-/// Variance of a direction beyond which the middle lies where it is seen, whatever the direction.
+/// Variance of a direction from which on the hidden middle grows no more unsure: a box that may lie
+/// anywhere about what is seen has its middle within half a length of it all the same.
 const MOST_YAW_VARIANCE: f64 = 0.09;
 
 /// Probability of a road user below which something is structure for sure.
@@ -210,7 +211,7 @@ impl Track {
 
     /// Whether it is a vehicle that was seen to drive.
     pub(super) fn is_moving_vehicle(&self) -> bool {
-        self.moves && self.shape.front_known && self.belief.vehicle() > 0.5
+        self.moves && self.shape.front_known && self.is_vehicle()
     }
 
     /// Whether it may turn out to be a piece of something.
@@ -312,7 +313,7 @@ impl Track {
 
     /// How much it says, 0 to 1, that nothing is found of it.
     fn telling(&self) -> f64 {
-        if self.moves && self.belief.vehicle() < 0.5 {
+        if self.moves && !self.is_vehicle() {
             (self.usual_points / SURELY_MET).clamp(LEAST_TELLING, 1.0)
         } else {
             1.0
