@@ -28,6 +28,9 @@ pub(super) struct Look {
     pub(super) range_m: f64,
     /// Hardly anything below the belt of a vehicle is seen.
     pub(super) is_upper: bool,
+    /// How much farther than the next ray an end may be, because between its ends, too, not every
+    /// ray meets it.
+    pub(super) gap_m: f64,
     /// Its leftmost and rightmost returns, seen from the sensor.
     pub(super) ends_m: [Vector2<f64>; 2],
     /// Something nearer hides what is to the left or to the right.
@@ -87,6 +90,7 @@ impl Look {
             roughness_m: roughness_m(spots, scan),
             goes_on: goes_on(spots, scan),
             range_m,
+            gap_m: range_m * scan.step_rad().abs() * missed_between(spots, ends, scan),
             is_upper: f64::from(low) < (LOW_SHARE * count).max(2.0),
             ends_m,
             is_cut: cuts(spots, ends, scan),
@@ -162,6 +166,16 @@ fn ends<'a>(spots: &'a [Spot], scan: &Scan) -> [&'a Spot; 2] {
             },
         ]
     })
+}
+
+/// Columns without a return for each one with a return, from end to end.
+fn missed_between(spots: &[Spot], ends: [&Spot; 2], scan: &Scan) -> f64 {
+    let column_of = |spot: &Spot| scan.column(spot.point as usize);
+    let [left, right] = ends.map(column_of);
+    let apart = left.abs_diff(right);
+    let across = apart.min(scan.columns() - apart) + 1;
+    let met = spots.chunk_by(|a, b| column_of(a) == column_of(b)).count();
+    across.saturating_sub(met) as f64 / met as f64
 }
 
 /// Whether something nearer stands directly to the left and to the right of a group.

@@ -22,17 +22,27 @@ pub(super) struct View {
     is_whole: [bool; 2],
     /// Only a cabin or a rider is seen: what is below reaches farther to both ends.
     is_upper: bool,
+    /// Nothing hides an end of it.
+    is_free: bool,
     /// The sensor looks at a side, not at the front or the rear.
     is_side_on: bool,
     sine: f64,
     cosine: f64,
-    range_m: f64,
+    /// Standard deviation of an edge.
+    edge_m: f64,
+    /// How much farther either axis may reach where not every ray meets it.
+    gap_m: [f64; 2],
 }
 
 /// Cosine from which on a side is looked at rather than an end.
 const SIDE_ON: f64 = 0.7;
 /// Part of a length below which what is seen of a side may be any piece of it.
 const PIECE: f64 = 0.4;
+
+/// Standard deviation of an edge: noise of ranges and roundness of corners.
+const EDGE_M: f64 = 0.07;
+/// What half a step between columns adds for each metre of range.
+const EDGE_PER_M: f64 = 0.002;
 
 impl View {
     /// What is seen of a group in the axes of a yaw.
@@ -52,10 +62,12 @@ impl View {
             high_is_edge: [false; 2],
             is_whole: [false; 2],
             is_upper: false,
+            is_free: look.is_cut == [false; 2],
             is_side_on: left[0].abs() > SIDE_ON,
             sine,
             cosine,
-            range_m: look.range_m,
+            edge_m: EDGE_M + EDGE_PER_M * look.range_m,
+            gap_m: [0, 1].map(|axis: usize| look.gap_m * left[axis].abs()),
         };
         for axis in 0..2 {
             // An end that lies to a hidden side is not the object's own.
@@ -99,30 +111,29 @@ impl View {
     }
 
     /// Where the middle of a box of this size is, given where it is expected, how sure its direction
-    /// is and whether it moves, and how sure that is, as a covariance in the local frame.
+    /// is and whether it is a vehicle that moves, and how sure that is, as a covariance in the
+    /// local frame.
     pub(super) fn centre(
         &self,
         size_m: [f64; 2],
         size_deviation_m: [f64; 2],
         expected_m: Vector2<f64>,
         yaw_variance: f64,
-        is_moving: bool,
+        is_moving_vehicle: bool,
     ) -> (Vector2<f64>, Matrix2<f64>) {
-        /// Standard deviation of an edge: noise of ranges and roundness of corners.
-        const EDGE_M: f64 = 0.07;
         /// Share of what is missing below a cabin by which its middle is off the vehicle's.
         const UPPER: f64 = 0.4;
         /// Share of the length that reaches out below a cabin to either end.
         const INSET: f64 = 0.1;
+        /// What is no longer is somebody, or has a rider, who is in the middle within this.
+        const LONGEST_WITH_RIDER_M: f64 = 2.5;
+        const RIDER_M: f64 = 0.15;
         /// What is longer is a lorry or a bus, as long above as below.
         const LONGEST_WITH_BONNET_M: f64 = 6.5;
-        /// What half a step between columns adds for each metre of range.
-        const EDGE_PER_M: f64 = 0.002;
         let expected = [
             expected_m.x * self.cosine + expected_m.y * self.sine,
             expected_m.y * self.cosine - expected_m.x * self.sine,
         ];
-        let edge_m = EDGE_M + EDGE_PER_M * self.range_m;
         let mut centre = [0.0; 2];
         let mut deviation = [0.0; 2];
         for axis in 0..2 {
@@ -135,39 +146,50 @@ impl View {
             } else {
                 0.0
             };
-            let edge_m = edge_m + inset_m;
+            // What stands shows its ends in the course of time.
+            let gap_m = if is_moving_vehicle {
+                self.gap_m[axis]
+            } else {
+                0.0
+            };
+            let edge_m = self.edge_m + gap_m + inset_m;
             // What drives out of sight is not seen up to its ends, whatever hides it.
-            let is_piece =
-                axis == 0 && is_moving && self.is_side_on && high - low < PIECE * size_m[axis];
+            let is_piece = axis == 0
+                && is_moving_vehicle
+                && self.is_side_on
+                && high - low < PIECE * size_m[axis];
             let is_edge = [self.low_is_edge[axis], self.high_is_edge[axis]];
-            (centre[axis], deviation[axis]) =
-                match is_edge.map(|is_edge| is_edge && !is_piece).into() {
-                    (true, true) if is_inset => {
-                        let slack_m = half_m - 0.5 * (high - low);
-                        (0.5 * (low + high), edge_m + UPPER * slack_m)
-                    }
-                    // Seen from end to end; if it is shorter than known, some of it was missed.
-                    (true, true) => {
-                        let missed_m = half_m - 0.5 * (high - low);
-                        (
-                            expected[axis].clamp(
-                                0.5 * (low + high) - 0.5 * missed_m,
-                                0.5 * (low + high) + 0.5 * missed_m,
-                            ),
-                            edge_m + 0.5 * missed_m,
-                        )
-                    }
-                    (true, false) => (low - inset_m + half_m, libm::hypot(edge_m, unsure_m)),
-                    (false, true) => (high + inset_m - half_m, libm::hypot(edge_m, unsure_m)),
-                    (false, false) => {
-                        let slack_m = half_m - 0.5 * (high - low);
-                        let middle = 0.5 * (low + high);
-                        (
-                            expected[axis].clamp(middle - slack_m, middle + slack_m),
-                            edge_m + slack_m,
-                        )
-                    }
-                };
+            // Of a bicycle of which the rider is seen nobody knows which end is nearer.
+            let is_rider = is_inset && size_m[axis] < LONGEST_WITH_RIDER_M;
+            let is_edge = is_edge.map(|is_edge| (is_edge || is_rider) && !is_piece);
+            (centre[axis], deviation[axis]) = match is_edge.into() {
+                (true, true) if is_rider && self.is_free => (0.5 * (low + high), edge_m + RIDER_M),
+                (true, true) if is_inset => {
+                    let slack_m = half_m - 0.5 * (high - low);
+                    (0.5 * (low + high), edge_m + UPPER * slack_m)
+                }
+                // Seen from end to end; if it is shorter than known, some of it was missed.
+                (true, true) => {
+                    let missed_m = half_m - 0.5 * (high - low);
+                    (
+                        expected[axis].clamp(
+                            0.5 * (low + high) - 0.5 * missed_m,
+                            0.5 * (low + high) + 0.5 * missed_m,
+                        ),
+                        edge_m + 0.5 * missed_m,
+                    )
+                }
+                (true, false) => (low - inset_m + half_m, libm::hypot(edge_m, unsure_m)),
+                (false, true) => (high + inset_m - half_m, libm::hypot(edge_m, unsure_m)),
+                (false, false) => {
+                    let slack_m = half_m - 0.5 * (high - low);
+                    let middle = 0.5 * (low + high);
+                    (
+                        expected[axis].clamp(middle - slack_m, middle + slack_m),
+                        edge_m + slack_m,
+                    )
+                }
+            };
         }
         // What a direction is off turns the hidden middle about what is seen.
         let seen = [0, 1].map(|axis| 0.5 * (self.low_m[axis] + self.high_m[axis]));
@@ -211,9 +233,10 @@ mod tests {
         let spots = spots_of(&scan);
         let look = Look::at(&spots, &scan, Vector2::zeros());
         let view = View::of(&look, &spots, 0.0);
-        let centre_x_m = |expected_x_m: f64, is_moving: bool| {
+        let centre_x_m = |expected_x_m: f64, is_moving_vehicle: bool| {
             let expected_m = Vector2::new(expected_x_m, 33.8);
-            let (centre_m, noise) = view.centre([4.3, 1.8], [0.1; 2], expected_m, 0.0, is_moving);
+            let (centre_m, noise) =
+                view.centre([4.3, 1.8], [0.1; 2], expected_m, 0.0, is_moving_vehicle);
             (centre_m.x, libm::sqrt(noise[(0, 0)]))
         };
         for expected_x_m in [0.0, 2.0] {
@@ -223,6 +246,55 @@ mod tests {
         let (x_m, deviation_m) = centre_x_m(0.0, false);
         assert_eq!(x_m, centre_x_m(2.0, false).0);
         assert!(deviation_m < 0.3);
+    }
+
+    #[test]
+    fn the_ends_of_what_drives_are_unsure_where_not_every_ray_meets_it() {
+        // The side of a car, 33 m away, behind a hedge that one column of so many sees through.
+        let edge_m = |every: usize, is_moving_vehicle: bool| {
+            let scan = scan_of(1800, |column, layer| match column {
+                0..36 if column % every == 0 && (6..8).contains(&layer) => 3300,
+                _ => 0,
+            });
+            let spots = spots_of(&scan);
+            let look = Look::at(&spots, &scan, Vector2::zeros());
+            let view = View::of(&look, &spots, 0.0);
+            let middle_m = look.middle_m + Vector2::new(0.0, 0.9);
+            let size_m = [view.extent_m()[0], 1.8];
+            let (_, noise) = view.centre(size_m, [0.0; 2], middle_m, 0.0, is_moving_vehicle);
+            libm::sqrt(noise[(0, 0)])
+        };
+        let whole_m = edge_m(1, true);
+        // For each of 8 columns that meet it 3.5 do not, each 12 cm wide.
+        assert!((edge_m(5, true) - whole_m - 3.5 * 0.115).abs() < 0.02);
+        assert!((edge_m(5, false) - whole_m).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_rider_of_whom_a_ray_is_seen_is_in_the_middle_of_the_bicycle() {
+        // At the height of a chest, 40 m away and askew.
+        let scan = scan_of(1800, |column, layer| match column {
+            300..302 if layer == 7 => 4000,
+            _ => 0,
+        });
+        let spots = spots_of(&scan);
+        let look = Look::at(&spots, &scan, Vector2::zeros());
+        let view = View::of(&look, &spots, 0.0);
+        for off_m in [-0.6, 0.6] {
+            let expected_m = look.middle_m + Vector2::new(off_m, 0.0);
+            let (centre_m, noise) = view.centre([1.7, 0.6], [0.1; 2], expected_m, 0.0, false);
+            let deviation_m = libm::sqrt(noise[(0, 0)]);
+            assert!((centre_m.x - look.middle_m.x).abs() < 0.01);
+            assert!(deviation_m < 0.5, "{deviation_m}");
+        }
+        // Beside what hides the rest it may be any part of the rider.
+        let look = Look {
+            is_cut: [true, false],
+            ..look
+        };
+        let view = View::of(&look, &spots, 0.0);
+        let (_, noise) = view.centre([1.7, 0.6], [0.1; 2], look.middle_m, 0.0, false);
+        assert!(libm::sqrt(noise[(0, 0)]) > 0.55);
     }
 
     #[test]
