@@ -6,6 +6,7 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use super::Scene;
+use super::rectangle::Rectangle;
 use super::road_user::Track;
 use super::spots::Spot;
 use crate::cluster::Clusters;
@@ -18,11 +19,12 @@ pub(super) struct Strays {
     marks: Vec<bool>,
 }
 
-/// Heights above the ground and distance from a known box at which a return of no cluster may be
-/// the object's.
+/// Heights above the ground, and above the object, at which a return of no cluster may be its.
 const LOW_M: f64 = 0.25;
 const ABOVE_M: f64 = 0.3;
+/// Distance from a known box up to which it may be: at least, and if nobody knows where the box is.
 const NEAR_M: f64 = 0.4;
+const FARTHEST_M: f64 = 1.0;
 
 impl Strays {
     /// Adds them to the spots of tracks that may be no cluster.
@@ -41,7 +43,20 @@ impl Strays {
                 continue;
             }
             let place = track.rectangle();
-            let corners = place.corners().map(|corner| placement.sensor_m(corner));
+            // Who is seen otherwise is there; of who is not, nobody knows where.
+            let is_seen = spots.iter().any(|spot| spot.group == number as u32);
+            let (near_m, more_m) = if track.is_hardly_met() && !is_seen {
+                let near_m = track.spread_m().clamp(NEAR_M, FARTHEST_M);
+                (near_m, near_m)
+            } else {
+                (NEAR_M, 0.0)
+            };
+            let around = Rectangle {
+                length_m: place.length_m + 2.0 * more_m,
+                width_m: place.width_m + 2.0 * more_m,
+                ..place
+            };
+            let corners = around.corners().map(|corner| placement.sensor_m(corner));
             let outline = place.outline();
             let heights_m = [LOW_M, track.height_m() + ABOVE_M].map(|metres| metres as f32);
             for columns in scan.stretches_across(&corners) {
@@ -50,7 +65,7 @@ impl Strays {
                 for point in marked(&self.marks).map(|place| points.start + place) {
                     let [x, y, _] = scan.point_m(point).map(f64::from);
                     let at_m = scene.placements[scan.column(point)].local_m([x, y]);
-                    if outline.distance_m(at_m) < NEAR_M {
+                    if outline.distance_m(at_m) < near_m {
                         let (point, group) = (point as u32, number as u32);
                         let offset_m = [0, 1].map(|axis| (at_m[axis] - origin_m[axis]) as f32);
                         spots.push(Spot::new(scene, point, offset_m, group));

@@ -224,6 +224,11 @@ impl Track {
         self.belief.vehicle() > 0.5
     }
 
+    /// Whether it moves, and a few rays meet it at most.
+    pub(super) fn is_hardly_met(&self) -> bool {
+        self.moves && self.usual_points < SURELY_MET
+    }
+
     pub(super) fn is_confirmed(&self) -> bool {
         self.existence.is_confirmed()
     }
