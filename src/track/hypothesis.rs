@@ -166,6 +166,16 @@ impl Hypothesis {
         self.settle();
     }
 
+    /// Takes over a velocity, as sure as it is.
+    pub(super) fn go_on(&mut self, velocity_mps: Vector2<f64>, deviation_mps: f64) {
+        self.state.fixed_rows_mut::<2>(2).copy_from(&velocity_mps);
+        for at in 2..4 {
+            self.covariance.row_mut(at).fill(0.0);
+            self.covariance.column_mut(at).fill(0.0);
+            self.covariance[(at, at)] = deviation_mps * deviation_mps;
+        }
+    }
+
     /// Keeps the covariance symmetric and its diagonal positive, against rounding.
     fn settle(&mut self) {
         self.covariance = 0.5 * (self.covariance + self.covariance.transpose());

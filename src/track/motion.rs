@@ -17,6 +17,9 @@ const TRANSITION: [[f64; 3]; 3] = [
 /// What a new object does.
 const AT_BIRTH: [f64; 3] = [0.5, 0.25, 0.25];
 
+/// What somebody does who was seen to move, and is most likely the same.
+const GOING_ON: [f64; 3] = [0.04, 0.48, 0.48];
+
 /// What is slower than this may stand a tenth of a second later.
 const STOPPING_MPS: f64 = 0.8;
 
@@ -166,6 +169,26 @@ impl Motion {
             hypothesis.probability = probability;
             for at in 2..5 {
                 hypothesis.state[at] = 0.0;
+            }
+        }
+    }
+
+    /// Goes on, from where it is, as somebody did who turned at a rate: its own velocity is not known
+    /// yet.
+    pub(super) fn go_on(
+        &mut self,
+        velocity_mps: Vector2<f64>,
+        yaw_rate_radps: f64,
+        deviation_mps: f64,
+    ) {
+        let hypotheses = self.hypotheses.iter_mut().zip(MODELS);
+        for ((hypothesis, model), probability) in hypotheses.zip(GOING_ON) {
+            hypothesis.probability = probability;
+            if model != Model::Standing {
+                hypothesis.go_on(velocity_mps, deviation_mps);
+            }
+            if model == Model::Turning {
+                hypothesis.state[4] = yaw_rate_radps;
             }
         }
     }

@@ -24,6 +24,13 @@ const SPEED_SHARE: f64 = 0.4;
 const GROWTH_M: f64 = 1.0;
 /// Standard deviation from which on nothing is known of a velocity.
 const UNKNOWN_MPS: f64 = 1.5;
+/// How fast somebody may have been whose velocity was not known, if it is soon seen again.
+const FASTEST_MPS: f64 = 10.0;
+const UNKNOWN_S: f64 = 0.4;
+/// Standard deviation of a velocity that is taken over from who was lost.
+const TAKEN_OVER_MPS: f64 = 1.5;
+/// Nobody walks so fast.
+const RUNNING_MPS: f64 = 3.0;
 /// Time within which something new does not show whether it stands: its box grows meanwhile.
 const NEW_S: f64 = 0.8;
 /// Share of the returns before below which a look says little of where something is: they may be
@@ -90,23 +97,40 @@ impl Parting {
         self.standing < 0.5 && self.velocity_mps.norm() > MOVING_MPS
     }
 
+    /// Whether it goes faster than anybody walks.
+    fn is_fast(&self) -> bool {
+        self.moves() && self.has_velocity() && self.velocity_mps.norm() > RUNNING_MPS
+    }
+
     /// How far from here the road user would be that parted before, on an arc from its last
     /// velocity to this one; `None` if that is too far, or if the velocities do not go together.
     fn off_from_m(&self, parted: &Self, length_m: f64) -> Option<f64> {
         let gap_s = (self.at - parted.at).seconds();
         if self.has_velocity() {
-            if !self.goes_together_with(parted, gap_s) {
+            if parted.has_velocity() && !self.goes_together_with(parted, gap_s) {
                 return None;
             }
             return self.off_arc_m(parted, self.velocity_mps, gap_s, length_m);
         }
-        // As long as its own velocity is not known, the other one went straight on or went on to
-        // turn.
-        let turn_rad = (parted.yaw_rate_radps * gap_s).clamp(-PI, PI);
-        let turned = Rotation2::new(turn_rad) * parted.velocity_mps;
-        let ends = [parted.velocity_mps, turned];
-        let off_m = ends.map(|end_mps| self.off_arc_m(parted, end_mps, gap_s, length_m));
-        off_m.into_iter().flatten().min_by(f64::total_cmp)
+        self.on_from(parted, length_m).map(|(off_m, _)| off_m)
+    }
+
+    /// As long as its own velocity is not known, the other one went straight on or went on to turn:
+    /// how far it is from the likelier end, and at which rate that turned.
+    fn on_from(&self, parted: &Self, length_m: f64) -> Option<(f64, f64)> {
+        let gap_s = (self.at - parted.at).seconds();
+        let ends = [0.0, parted.yaw_rate_radps].map(|rate_radps| {
+            let end_mps = parted.velocity_after_mps(rate_radps, gap_s);
+            let off_m = self.off_arc_m(parted, end_mps, gap_s, length_m);
+            off_m.map(|off_m| (off_m, rate_radps))
+        });
+        let ends = ends.into_iter().flatten();
+        ends.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Its velocity after some seconds of turning at a rate.
+    fn velocity_after_mps(&self, rate_radps: f64, seconds: f64) -> Vector2<f64> {
+        Rotation2::new((rate_radps * seconds).clamp(-PI, PI)) * self.velocity_mps
     }
 
     /// Whether what had one velocity can have the other one so much later.
@@ -130,13 +154,20 @@ impl Parting {
         gap_s: f64,
         length_m: f64,
     ) -> Option<f64> {
-        let half_rad = (0.5 * parted.velocity_mps.angle(&end_mps)).max(1e-6);
-        let speed_mps = 0.5 * (parted.velocity_mps.norm() + end_mps.norm());
+        let begin_mps = if parted.has_velocity() {
+            parted.velocity_mps
+        } else {
+            end_mps
+        };
+        let half_rad = (0.5 * begin_mps.angle(&end_mps)).max(1e-6);
+        let speed_mps = 0.5 * (begin_mps.norm() + end_mps.norm());
         let chord_m = speed_mps * gap_s * libm::sin(half_rad) / half_rad;
-        let course = (parted.velocity_mps + end_mps).try_normalize(1e-6);
+        let course = (begin_mps + end_mps).try_normalize(1e-6);
         let way_m = course.map_or(Vector2::zeros(), |course| course * chord_m);
         let off_m = (self.position_m - parted.position_m - way_m).norm();
-        let farthest_m = OFF_M + OFF_PER_LENGTH * length_m + OFF_PER_WAY * way_m.norm();
+        let may_have_driven = !parted.has_velocity() && gap_s < UNKNOWN_S;
+        let unknown_m = f64::from(u8::from(may_have_driven)) * FASTEST_MPS * gap_s;
+        let farthest_m = OFF_M + OFF_PER_LENGTH * length_m + OFF_PER_WAY * way_m.norm() + unknown_m;
         (off_m < farthest_m).then_some(off_m)
     }
 }
@@ -159,18 +190,14 @@ impl Track {
         if !is_in_time || !is_apart || self.shape.seen_m[0] > length_m + GROWTH_M {
             return None;
         }
-        let is_new = !self.moves && (self.time - self.first_seen).seconds() < NEW_S;
-        let own = if is_new {
-            self.parted.of_unknown_velocity()
-        } else {
-            self.parted
-        };
-        // What moves tells by its speed whether it is the same.
-        let tells = lost.parted.moves() && own.has_velocity();
+        let own = self.parting_known_at(self.time);
+        let parted = lost.parting_known_at(lost.parted.at);
+        // What moves tells by its speed whether it is the same, and nobody walks where a car drives on.
+        let tells = parted.is_fast() || (parted.moves() && own.has_velocity());
         if !tells && self.is_vehicle() != lost.is_vehicle() {
             return None;
         }
-        own.off_from_m(&lost.parted, length_m)
+        own.off_from_m(&parted, length_m)
     }
 
     /// Whether nothing or hardly anything is seen of it, though others know it.
@@ -178,8 +205,51 @@ impl Track {
         self.is_published && (self.points == 0 || self.parted.at < self.last_measured)
     }
 
+    /// Whether it stands in the place of a known one of which less is seen: both are one.
+    pub(in crate::track) fn replaces(&self, known: &Self) -> bool {
+        let (own, other) = (self.rectangle(), known.rectangle());
+        let gap_s = (self.parted.at - known.parted.at).seconds();
+        let knows_better = !self.is_new_at(self.time) && self.parted.has_velocity();
+        let is_other_way = knows_better
+            && known.parted.has_velocity()
+            && !self.parted.goes_together_with(&known.parted, gap_s);
+        let are_in_one_place =
+            || own.outline().contains(other.centre_m) || other.outline().contains(own.centre_m);
+        known.is_published
+            && known.is_vehicle() == self.is_vehicle()
+            && (known.points as f64) < CLEAR * self.points as f64
+            && self.shape.seen_m[0] <= other.length_m + GROWTH_M
+            && !is_other_way
+            && are_in_one_place()
+    }
+
+    /// Whether it did not show yet whether it moves.
+    fn is_new_at(&self, time: Time) -> bool {
+        !self.moves && (time - self.first_seen).seconds() < NEW_S
+    }
+
+    /// Where it was last seen clearly, with its velocity if that was known at a time.
+    fn parting_known_at(&self, time: Time) -> Parting {
+        if self.is_new_at(time) {
+            self.parted.of_unknown_velocity()
+        } else {
+            self.parted
+        }
+    }
+
     /// Goes on as a road user that was lost.
     pub(in crate::track) fn take_over(&mut self, lost: &Self) {
+        let is_same_kind = lost.is_vehicle() == self.is_vehicle();
+        if self.is_new_at(self.time) && lost.moves && lost.parted.is_fast() && is_same_kind {
+            let length_m = lost.rectangle().length_m;
+            let on = self.parted.on_from(&lost.parted, length_m);
+            let rate_radps = on.map_or(0.0, |(_, rate_radps)| rate_radps);
+            let gap_s = (self.time - lost.parted.at).seconds();
+            let velocity_mps = lost.parted.velocity_after_mps(rate_radps, gap_s);
+            self.motion.go_on(velocity_mps, rate_radps, TAKEN_OVER_MPS);
+            self.parted = Parting::of(&self.motion.estimate(), self.points, self.time);
+            self.moves = true;
+        }
         self.id = lost.id;
         self.first_seen = lost.first_seen;
         if lost.belief.road_user() > self.belief.road_user() {
@@ -194,6 +264,7 @@ mod tests {
     use super::*;
     use crate::cloud::tests::scan_of;
     use crate::time::Span;
+    use crate::track::belief::Belief;
     use crate::track::look::Look;
     use crate::track::spots::Spot;
     use crate::track::tests::spots_of;
@@ -305,6 +376,7 @@ mod tests {
         let look = Look::at(&spots, &scan, Vector2::zeros());
         let track = |id| Track::new(id, false, &spots, &look, begin, 0.0, &mut vec![]);
         let mut lost = track(1);
+        lost.moves = true;
         lost.parted = Parting {
             at: begin,
             ..at(0.0)
@@ -323,6 +395,127 @@ mod tests {
             seen.off_from_m(&lost).is_some()
         };
         assert!(is_found_after(0.4) && !is_found_after(1.2));
+    }
+
+    /// A track of what is 15 m away and so many columns wide.
+    fn track_of(columns: usize, id: u32, end: Time) -> Track {
+        let scan = scan_of(1800, |column, layer| {
+            u16::from(column < columns && (5..9).contains(&layer)) * 1500
+        });
+        let spots = spots_of(&scan);
+        let look = Look::at(&spots, &scan, Vector2::zeros());
+        Track::new(id, false, &spots, &look, end, 0.0, &mut vec![])
+    }
+
+    /// What is thought of somebody on foot.
+    fn somebody() -> Belief {
+        track_of(10, 0, Time::ZERO).belief
+    }
+
+    /// A track that was seen at a parting, since some seconds before.
+    fn track_at(id: u32, parted: Parting, age_s: f64) -> Track {
+        let mut track = track_of(40, id, parted.at);
+        (track.time, track.last_measured) = (parted.at, parted.at);
+        track.first_seen = parted.at + Span::from_seconds(-age_s);
+        track.parted = parted;
+        track
+    }
+
+    #[test]
+    fn who_was_lost_so_soon_that_it_only_seemed_to_stand_may_have_driven_on() {
+        let standing = Parting {
+            velocity_mps: Vector2::zeros(),
+            deviation_mps: 0.8,
+            standing: 0.9,
+            ..at(0.0)
+        };
+        let is_found_at_m = |age_s: f64, metres: f64| {
+            let lost = track_at(1, standing, age_s);
+            let mut seen = later(standing, 0.3);
+            seen.position_m.x += metres;
+            track_at(2, seen, 0.2).off_from_m(&lost).is_some()
+        };
+        assert!(is_found_at_m(0.4, 3.5) && !is_found_at_m(0.4, 6.5));
+        assert!(is_found_at_m(1.5, 1.0) && !is_found_at_m(1.5, 3.5));
+        let mut late = later(standing, 2.0);
+        late.position_m.x += 3.5;
+        let lost = track_at(1, standing, 0.4);
+        assert_eq!(track_at(2, late, 0.2).off_from_m(&lost), None);
+        // Nor does its velocity tell anything of whom is known to drive now.
+        let driving = Parting {
+            at: later(standing, 0.3).at,
+            ..at(0.0)
+        };
+        assert_eq!(driving.off_from_m(&standing, 1.0), None);
+        let unknown = standing.of_unknown_velocity();
+        assert!(driving.off_from_m(&unknown, 1.0).is_some());
+    }
+
+    #[test]
+    fn who_drove_fast_may_be_taken_for_something_else_when_it_is_seen_anew() {
+        let mut lost = track_at(1, on_circle(11.0, 8.0, 0.0), 2.0);
+        (lost.moves, lost.belief) = (true, somebody());
+        let seen = track_at(2, on_circle(11.0, 8.0, 0.3), 0.2);
+        assert_ne!(seen.is_vehicle(), lost.is_vehicle());
+        assert!(seen.off_from_m(&lost).is_some());
+        // Who walks is no car.
+        let mut lost = track_at(1, on_circle(11.0, 1.5, 0.0), 2.0);
+        (lost.moves, lost.belief) = (true, somebody());
+        assert_eq!(
+            track_at(2, on_circle(11.0, 1.5, 0.1), 0.2).off_from_m(&lost),
+            None
+        );
+    }
+
+    #[test]
+    fn who_is_too_new_goes_on_as_fast_as_the_one_who_was_lost() {
+        let mut lost = track_at(1, on_circle(11.0, 8.0, 0.0), 2.0);
+        lost.moves = true;
+        let on_arc = on_circle(11.0, 8.0, 0.8);
+        let gap_s = (on_arc.at - lost.parted.at).seconds();
+        let ahead = Parting {
+            position_m: lost.parted.position_m + lost.parted.velocity_mps * gap_s,
+            ..on_arc
+        };
+        let after = |lost: &Track, seen: Parting| {
+            let mut seen = track_at(2, seen, 0.2);
+            seen.take_over(lost);
+            (seen.id, seen.velocity_mps())
+        };
+        let is_near = |(id, velocity_mps): (u32, Vector2<f64>), other_mps: Vector2<f64>| {
+            id == 1 && (velocity_mps - other_mps).norm() < 0.4
+        };
+        assert!(is_near(after(&lost, on_arc), on_arc.velocity_mps));
+        assert!(is_near(after(&lost, ahead), lost.parted.velocity_mps));
+        // Who walks may as well have stopped, and what is something else may stand.
+        let mut walking = lost.clone();
+        walking.parted.velocity_mps *= 0.2;
+        assert_eq!(after(&walking, on_arc), (1, Vector2::zeros()));
+        lost.belief = somebody();
+        assert_eq!(after(&lost, on_arc), (1, Vector2::zeros()));
+    }
+
+    #[test]
+    fn two_in_one_place_are_one_and_the_one_of_which_more_is_seen_is_right() {
+        let mut known = track_at(1, at(0.0), 2.0);
+        let seen = track_at(2, at(0.0), 0.3);
+        known.points = 9;
+        assert!(!seen.replaces(&known), "nobody knows it");
+        known.is_published = true;
+        assert!(seen.replaces(&known));
+        known.points = seen.points;
+        assert!(!seen.replaces(&known));
+        known.points = 9;
+        let mut elsewhere = known.clone();
+        elsewhere.motion.shift(Vector2::new(6.0, 0.0));
+        assert!(!seen.replaces(&elsewhere));
+        let mut oncoming = known.clone();
+        oncoming.parted.velocity_mps *= -1.0;
+        let mut driving = seen.clone();
+        driving.moves = true;
+        assert!(driving.replaces(&known) && !driving.replaces(&oncoming));
+        known.belief = somebody();
+        assert!(!seen.replaces(&known), "a car and who stands beside it");
     }
 
     #[test]
