@@ -173,8 +173,8 @@ impl Motion {
         }
     }
 
-    /// Goes on, from where it is, as somebody did who turned at a rate: its own velocity is not known
-    /// yet.
+    /// Goes on, from where it is, as somebody did who turned at a rate: its own velocity is not
+    /// known yet.
     pub(super) fn go_on(
         &mut self,
         velocity_mps: Vector2<f64>,

@@ -165,8 +165,11 @@ impl Parting {
         let course = (begin_mps + end_mps).try_normalize(1e-6);
         let way_m = course.map_or(Vector2::zeros(), |course| course * chord_m);
         let off_m = (self.position_m - parted.position_m - way_m).norm();
-        let may_have_driven = !parted.has_velocity() && gap_s < UNKNOWN_S;
-        let unknown_m = f64::from(u8::from(may_have_driven)) * FASTEST_MPS * gap_s;
+        let unknown_m = if !parted.has_velocity() && gap_s < UNKNOWN_S {
+            FASTEST_MPS * gap_s
+        } else {
+            0.0
+        };
         let farthest_m = OFF_M + OFF_PER_LENGTH * length_m + OFF_PER_WAY * way_m.norm() + unknown_m;
         (off_m < farthest_m).then_some(off_m)
     }
@@ -192,7 +195,7 @@ impl Track {
         }
         let own = self.parting_known_at(self.time);
         let parted = lost.parting_known_at(lost.parted.at);
-        // What moves tells by its speed whether it is the same, and nobody walks where a car drives on.
+        // What moves tells by its speed whether it is the same; nobody walks where a car drives on.
         let tells = parted.is_fast() || (parted.moves() && own.has_velocity());
         if !tells && self.is_vehicle() != lost.is_vehicle() {
             return None;
@@ -208,11 +211,11 @@ impl Track {
     /// Whether it stands in the place of a known one of which less is seen: both are one.
     pub(in crate::track) fn replaces(&self, known: &Self) -> bool {
         let (own, other) = (self.rectangle(), known.rectangle());
-        let gap_s = (self.parted.at - known.parted.at).seconds();
-        let knows_better = !self.is_new_at(self.time) && self.parted.has_velocity();
-        let is_other_way = knows_better
-            && known.parted.has_velocity()
-            && !self.parted.goes_together_with(&known.parted, gap_s);
+        let (seen, parted) = (self.parting_known_at(self.time), known.parted);
+        let gap_s = (seen.at - parted.at).seconds();
+        let is_other_way = seen.has_velocity()
+            && parted.has_velocity()
+            && !seen.goes_together_with(&parted, gap_s);
         let are_in_one_place =
             || own.outline().contains(other.centre_m) || other.outline().contains(own.centre_m);
         known.is_published
@@ -407,8 +410,8 @@ mod tests {
         Track::new(id, false, &spots, &look, end, 0.0, &mut vec![])
     }
 
-    /// What is thought of somebody on foot.
-    fn somebody() -> Belief {
+    /// What is thought of something narrow, which is no vehicle.
+    fn no_vehicle() -> Belief {
         track_of(10, 0, Time::ZERO).belief
     }
 
@@ -454,13 +457,13 @@ mod tests {
     #[test]
     fn who_drove_fast_may_be_taken_for_something_else_when_it_is_seen_anew() {
         let mut lost = track_at(1, on_circle(11.0, 8.0, 0.0), 2.0);
-        (lost.moves, lost.belief) = (true, somebody());
+        (lost.moves, lost.belief) = (true, no_vehicle());
         let seen = track_at(2, on_circle(11.0, 8.0, 0.3), 0.2);
         assert_ne!(seen.is_vehicle(), lost.is_vehicle());
         assert!(seen.off_from_m(&lost).is_some());
         // Who walks is no car.
         let mut lost = track_at(1, on_circle(11.0, 1.5, 0.0), 2.0);
-        (lost.moves, lost.belief) = (true, somebody());
+        (lost.moves, lost.belief) = (true, no_vehicle());
         assert_eq!(
             track_at(2, on_circle(11.0, 1.5, 0.1), 0.2).off_from_m(&lost),
             None
@@ -491,7 +494,7 @@ mod tests {
         let mut walking = lost.clone();
         walking.parted.velocity_mps *= 0.2;
         assert_eq!(after(&walking, on_arc), (1, Vector2::zeros()));
-        lost.belief = somebody();
+        lost.belief = no_vehicle();
         assert_eq!(after(&lost, on_arc), (1, Vector2::zeros()));
     }
 
@@ -514,7 +517,7 @@ mod tests {
         let mut driving = seen.clone();
         driving.moves = true;
         assert!(driving.replaces(&known) && !driving.replaces(&oncoming));
-        known.belief = somebody();
+        known.belief = no_vehicle();
         assert!(!seen.replaces(&known), "a car and who stands beside it");
     }
 
