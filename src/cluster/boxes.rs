@@ -20,7 +20,7 @@ pub(super) struct Bounds {
 /// A corner of a box: x, y, z, and range.
 type Corner = [f32; AXES];
 
-pub(super) const AXES: usize = 4;
+const AXES: usize = 4;
 /// Of which so many are in space.
 const SPACE: usize = 3;
 /// The place of the range in a corner.
@@ -33,8 +33,18 @@ impl Bounds {
         high_m: [f32::NEG_INFINITY; AXES],
     };
 
+    /// Grows around a point: x, y, z, and range.
+    #[inline(always)]
+    pub(super) fn hold(&mut self, point_m: [f32; AXES]) {
+        self.hold_all(&Self {
+            low_m: point_m,
+            high_m: point_m,
+        });
+    }
+
     /// Grows around another box.
-    pub(super) fn hold(&mut self, other: &Self) {
+    #[inline(always)]
+    pub(super) fn hold_all(&mut self, other: &Self) {
         for axis in 0..AXES {
             self.low_m[axis] = least(self.low_m[axis], other.low_m[axis]);
             self.high_m[axis] = greatest(self.high_m[axis], other.high_m[axis]);
@@ -193,8 +203,8 @@ mod tests {
             low_m: [metres; AXES],
             high_m: [metres + 1.0; AXES],
         };
-        bounds.hold(&around(3.0));
-        bounds.hold(&around(7.0));
+        bounds.hold_all(&around(3.0));
+        bounds.hold_all(&around(7.0));
         assert_eq!((bounds.low_m, bounds.high_m), ([3.0; AXES], [8.0; AXES]));
         assert_eq!(bounds.squared_distance_to([5.0, 9.0, 1.0]), 1.0 + 4.0);
         assert_eq!(bounds.nearest_m(), 3.0);

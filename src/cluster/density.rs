@@ -240,8 +240,9 @@ fn judge(
 fn keep_core(eps_squared: &mut [f32], is_core: &[bool]) {
     let is_core = &is_core[..eps_squared.len()];
     for point in 0..eps_squared.len() {
-        let eps = eps_squared[point];
-        eps_squared[point] = if is_core[point] { eps } else { NOT_TAKEN };
+        // The sign alone makes it negative: a choice would be a masked store.
+        let sign = u32::from(!is_core[point]) << (u32::BITS - 1);
+        eps_squared[point] = f32::from_bits(eps_squared[point].to_bits() | sign);
     }
 }
 

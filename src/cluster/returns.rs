@@ -6,7 +6,7 @@ use multiversion::multiversion;
 
 use super::ClusterParameters;
 use crate::cloud::{MAX_LAYERS, Scan};
-use crate::float::{least, least_of};
+use crate::float::{LANES, least, least_each, least_of};
 
 /// All points of a revolution, in array order. Nothing is a neighbour of those that are not looked
 /// at.
@@ -32,15 +32,12 @@ pub(super) struct Centre {
     pub(super) eps_m: f32,
 }
 
-/// Layers of a column that are compared at once.
-const AT_ONCE: usize = 8;
-
 /// The first of the layers that are compared at once, as often as it takes for some layers: once, or
 /// twice for all of them.
 fn starts(layers: &Range<usize>) -> impl Iterator<Item = usize> + use<> {
-    let last = MAX_LAYERS - AT_ONCE;
+    let last = MAX_LAYERS - LANES;
     let first = layers.start.min(last);
-    let is_one = layers.end <= first + AT_ONCE;
+    let is_one = layers.end <= first + LANES;
     let starts = if is_one {
         [Some(first), None]
     } else {
@@ -165,15 +162,15 @@ impl<'a> Stretch<'a> {
             y_m: &returns.y_m.as_chunks().0[start..end],
             z_m: &returns.z_m.as_chunks().0[start..end],
             eps_squared: &returns.eps_squared.as_chunks().0[start..end],
-            layer: layer.min(MAX_LAYERS - AT_ONCE),
+            layer: layer.min(MAX_LAYERS - LANES),
         }
     }
 
     /// Squared distances of a column's points from the centre, and those up to which they are its
     /// neighbours.
     #[inline(always)]
-    fn compared(&self, column: usize, centre: &Centre) -> ([f32; AT_ONCE], [f32; AT_ONCE]) {
-        let layers = self.layer..self.layer + AT_ONCE;
+    fn compared(&self, column: usize, centre: &Centre) -> ([f32; LANES], [f32; LANES]) {
+        let layers = self.layer..self.layer + LANES;
         let (x_m, y_m) = (
             &self.x_m[column][layers.clone()],
             &self.y_m[column][layers.clone()],
@@ -184,8 +181,8 @@ impl<'a> Stretch<'a> {
         );
         let [x, y, z] = centre.position_m;
         let own = centre.eps_m * centre.eps_m;
-        let (mut squared, mut most) = ([0.0; AT_ONCE], [0.0; AT_ONCE]);
-        for lane in 0..AT_ONCE {
+        let (mut squared, mut most) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
             let (dx, dy, dz) = (x_m[lane] - x, y_m[lane] - y, z_m[lane] - z);
             squared[lane] = dx * dx + dy * dy + dz * dz;
             most[lane] = least(own, eps[lane]);
@@ -198,21 +195,14 @@ impl<'a> Stretch<'a> {
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn count(returns: &Returns<'_>, columns: &Range<usize>, layer: usize, centre: &Centre) -> u32 {
     let stretch = Stretch::of(returns, columns, layer);
-    // In turns, so that they are kept as vectors.
-    let mut found = [[0.0; AT_ONCE]; 2];
+    // Sums of floats keep their order: columns are not turned into lanes.
+    let mut found = [0.0; LANES];
     for column in 0..stretch.x_m.len() {
         let (squared, most) = stretch.compared(column, centre);
-        let found = &mut found[column % 2];
-        for lane in 0..AT_ONCE {
-            found[lane] += if squared[lane] <= most[lane] {
-                1.0
-            } else {
-                0.0
-            };
-        }
+        let near = |lane| f32::from(squared[lane] <= most[lane]);
+        found = std::array::from_fn(|lane| found[lane] + near(lane));
     }
-    let found: f32 = found.as_flattened().iter().sum();
-    found as u32
+    found.iter().sum::<f32>() as u32
 }
 
 /// Squared distance from a point to its nearest neighbour in some layers of a stretch of columns.
@@ -224,22 +214,19 @@ fn squared_to_nearest(
     centre: &Centre,
 ) -> f32 {
     let stretch = Stretch::of(returns, columns, layer);
-    let mut nearest = [[f32::INFINITY; AT_ONCE]; 2];
+    let mut nearest = [f32::INFINITY; LANES];
     for column in 0..stretch.x_m.len() {
         let (squared, most) = stretch.compared(column, centre);
-        let nearest = &mut nearest[column % 2];
-        for lane in 0..AT_ONCE {
-            let is_near = squared[lane] <= most[lane];
-            let squared = if is_near {
+        let near = std::array::from_fn(|lane| {
+            if squared[lane] <= most[lane] {
                 squared[lane]
             } else {
                 f32::INFINITY
-            };
-            nearest[lane] = least(nearest[lane], squared);
-        }
+            }
+        });
+        nearest = least_each(nearest, near);
     }
-    let [even, odd] = nearest.map(least_of);
-    least(even, odd)
+    least_of(nearest)
 }
 
 /// The first neighbour at a squared distance from a point, in some layers of a stretch of columns.
@@ -255,13 +242,13 @@ fn first_at(
     for column in 0..stretch.x_m.len() {
         let (squared, most) = stretch.compared(column, centre);
         // The numbers of those that are; of the others a greater one.
-        let mut numbers = [AT_ONCE as f32; AT_ONCE];
-        for lane in 0..AT_ONCE {
+        let mut numbers = [LANES as f32; LANES];
+        for lane in 0..LANES {
             let is_it = (squared[lane] == wanted) & (wanted <= most[lane]);
-            numbers[lane] = if is_it { lane as f32 } else { AT_ONCE as f32 };
+            numbers[lane] = if is_it { lane as f32 } else { LANES as f32 };
         }
         let first = least_of(numbers) as usize;
-        if first < AT_ONCE {
+        if first < LANES {
             return (columns.start + column) * MAX_LAYERS + stretch.layer + first;
         }
     }

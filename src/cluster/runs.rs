@@ -5,12 +5,11 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use super::ClusterParameters;
-use super::boxes::{AXES, Bounds};
+use super::boxes::Bounds;
 use super::density::Density;
 use super::returns::Returns;
 use super::window::{Cone, Windows};
 use crate::cloud::{CAPACITY, MAX_LAYERS};
-use crate::float::{greatest, least};
 
 /// What is known of a revolution's core points before they are joined.
 #[derive(Clone, Copy)]
@@ -91,10 +90,8 @@ pub(super) struct Runs {
     of: Box<[u16; CAPACITY]>,
     /// Where runs begin, or have just ended.
     edges: Box<[bool; CAPACITY]>,
-    /// The runs that go on, and the corners of what they have so far.
+    /// The runs that go on.
     open: [u16; MAX_LAYERS],
-    low_m: [[f32; MAX_LAYERS]; AXES],
-    high_m: [[f32; MAX_LAYERS]; AXES],
 }
 
 impl Runs {
@@ -107,8 +104,6 @@ impl Runs {
             of: Box::new([Self::NONE; CAPACITY]),
             edges: Box::new([false; CAPACITY]),
             open: [Self::NONE; MAX_LAYERS],
-            low_m: Default::default(),
-            high_m: Default::default(),
         }
     }
 
@@ -142,21 +137,16 @@ impl Runs {
             while edges != 0 {
                 let layer = edges.trailing_zeros() as usize / 8;
                 edges &= edges - 1;
-                self.end(layer, column);
+                self.end(layer, column, returns);
                 if is_core[layer] {
                     self.begin(layer, column);
                 }
             }
-            extend(
-                [&returns.x_m, &returns.y_m, &returns.z_m, &returns.range_m]
-                    .map(|metres| &metres.as_chunks().0[column]),
-                (&mut self.low_m, &mut self.high_m),
-            );
             let of: &mut [u16; MAX_LAYERS] = &mut self.of.as_chunks_mut().0[column];
             *of = self.open;
         }
         for layer in 0..MAX_LAYERS {
-            self.end(layer, len / MAX_LAYERS);
+            self.end(layer, len / MAX_LAYERS, returns);
         }
     }
 
@@ -169,21 +159,20 @@ impl Runs {
             columns: column..column,
             bounds: Bounds::NONE,
         });
-        for axis in 0..AXES {
-            self.low_m[axis][layer] = Bounds::NONE.low_m[axis];
-            self.high_m[axis][layer] = Bounds::NONE.high_m[axis];
-        }
     }
 
     /// Ends the run that goes on in a layer, if there is one, before a column.
-    fn end(&mut self, layer: usize, column: usize) {
+    fn end(&mut self, layer: usize, column: usize, returns: &Returns<'_>) {
         let number = std::mem::replace(&mut self.open[layer], Self::NONE);
         if let Some(run) = self.runs.get_mut(usize::from(number)) {
             run.columns.end = column as u16;
-            run.bounds = Bounds {
-                low_m: [0, 1, 2, 3].map(|axis: usize| self.low_m[axis][layer]),
-                high_m: [0, 1, 2, 3].map(|axis: usize| self.high_m[axis][layer]),
-            };
+            let mut bounds = Bounds::NONE;
+            for column in run.columns() {
+                let point = run.point(column);
+                let [x, y, z] = returns.position_m(point);
+                bounds.hold([x, y, z, returns.range_m[point]]);
+            }
+            run.bounds = bounds;
         }
     }
 }
@@ -208,22 +197,5 @@ fn mark_edges(is_core: &[bool], follows: &[bool], edges: &mut [bool]) {
     for pair in 0..pairs {
         edges[pair] =
             (before[pair] | is_core[pair]) & !(before[pair] & is_core[pair] & follows[pair]);
-    }
-}
-
-/// Makes the boxes of all layers hold the points of a column.
-#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-fn extend(
-    column: [&[f32; MAX_LAYERS]; AXES],
-    (low_m, high_m): (
-        &mut [[f32; MAX_LAYERS]; AXES],
-        &mut [[f32; MAX_LAYERS]; AXES],
-    ),
-) {
-    for axis in 0..AXES {
-        for layer in 0..MAX_LAYERS {
-            low_m[axis][layer] = least(low_m[axis][layer], column[axis][layer]);
-            high_m[axis][layer] = greatest(high_m[axis][layer], column[axis][layer]);
-        }
     }
 }

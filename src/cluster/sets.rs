@@ -62,7 +62,7 @@ impl Sets {
                 });
             }
             let set = &mut self.sets[self.places[*first as usize] as usize];
-            set.bounds.hold(&run.bounds);
+            set.bounds.hold_all(&run.bounds);
             set.members.end += 1;
         }
     }

@@ -7,7 +7,7 @@ use multiversion::multiversion;
 use super::SECTORS;
 use super::surface::STEEPEST;
 use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, Scan};
-use crate::float::{greatest, least};
+use crate::float::{LANES, greatest_each, least_each};
 
 /// The points of a revolution.
 pub(super) struct Points<'a> {
@@ -72,8 +72,6 @@ impl Lowest {
 
     /// Finds the lowest of what was noted.
     pub(super) fn sort(&mut self) {
-        self.sorted_m = [[NO_LEVEL_M; MAX_LAYERS]; KEPT];
-        self.counts = [0; MAX_LAYERS];
         keep_lowest(&self.noted_m, &mut self.sorted_m, &mut self.counts);
     }
 
@@ -135,19 +133,22 @@ fn keep_lowest(
     lowest: &mut [[f32; MAX_LAYERS]; KEPT],
     counts: &mut [u32; MAX_LAYERS],
 ) {
-    for row in rows {
-        let mut row = *row;
-        for lane in 0..MAX_LAYERS {
-            counts[lane] += u32::from(row[lane] < NO_LEVEL_M);
-        }
-        for kept in lowest.iter_mut() {
-            let mut lower = [0.0; MAX_LAYERS];
-            for lane in 0..MAX_LAYERS {
-                lower[lane] = least(kept[lane], row[lane]);
-                row[lane] = greatest(kept[lane], row[lane]);
+    for half in 0..MAX_LAYERS / LANES {
+        let mut kept = [[NO_LEVEL_M; LANES]; KEPT];
+        let mut count = [0; LANES];
+        for row in rows {
+            let mut row = row.as_chunks().0[half];
+            count = std::array::from_fn(|lane| count[lane] + u32::from(row[lane] < NO_LEVEL_M));
+            for kept in &mut kept {
+                let lower = least_each(*kept, row);
+                row = greatest_each(*kept, row);
+                *kept = lower;
             }
-            *kept = lower;
         }
+        for (lowest, kept) in lowest.iter_mut().zip(kept) {
+            lowest.as_chunks_mut().0[half] = kept;
+        }
+        counts.as_chunks_mut().0[half] = count;
     }
 }
 

@@ -4,7 +4,7 @@ use multiversion::multiversion;
 
 use super::surface::Ring;
 use crate::cloud::MAX_LAYERS;
-use crate::float::{greatest, least};
+use crate::float::{LANES, greatest_each, least_each};
 
 /// Sectors to either side that vote on a level.
 pub(super) const VOTERS: usize = 3;
@@ -19,48 +19,56 @@ const ALIKE: f32 = 0.35;
 /// distance, for every layer.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 pub(super) fn elected(voters: &[[Ring; MAX_LAYERS]; ALL]) -> [Ring; MAX_LAYERS] {
-    let own = &voters[VOTERS];
-    let mut levels_m = [[f32::INFINITY; MAX_LAYERS]; ALL];
-    let (mut total_m, mut votes) = ([0.0; MAX_LAYERS], [0.0; MAX_LAYERS]);
-    for voter in 0..ALL {
-        for layer in 0..MAX_LAYERS {
-            let Ring {
-                distance_m,
-                level_m,
-            } = voters[voter][layer];
-            let own_m = own[layer].distance_m;
-            let is_alike = (own_m == 0.0) | ((distance_m - own_m).abs() < ALIKE * own_m);
-            let votes_for_it = (distance_m > 0.0) & is_alike;
-            levels_m[voter][layer] = if votes_for_it { level_m } else { f32::INFINITY };
-            total_m[layer] += if votes_for_it { distance_m } else { 0.0 };
-            votes[layer] += if votes_for_it { 1.0 } else { 0.0 };
-        }
-    }
-    sort(&mut levels_m);
     let mut elected = [Ring::default(); MAX_LAYERS];
-    for layer in 0..MAX_LAYERS {
-        let votes = votes[layer];
-        let is_seen = own[layer].distance_m > 0.0;
-        if votes >= FEWEST_VOTES || votes > 0.0 && is_seen {
-            elected[layer] = Ring {
-                distance_m: total_m[layer] / votes,
-                level_m: levels_m[votes as usize / 2][layer],
-            };
-        }
+    for half in 0..MAX_LAYERS / LANES {
+        let voters = voters.each_ref().map(|rings| &rings.as_chunks().0[half]);
+        elected.as_chunks_mut().0[half] = elected_of_half(voters);
     }
     elected
 }
 
+/// The same of as many layers as are looked at at once.
+#[inline(always)]
+fn elected_of_half(voters: [&[Ring; LANES]; ALL]) -> [Ring; LANES] {
+    let own = voters[VOTERS];
+    let mut levels_m = [[f32::INFINITY; LANES]; ALL];
+    let (mut total_m, mut votes) = ([0.0; LANES], [0.0; LANES]);
+    for (rings, levels_m) in voters.into_iter().zip(&mut levels_m) {
+        let votes_for_it: [bool; LANES] = std::array::from_fn(|lane| {
+            let (distance_m, own_m) = (rings[lane].distance_m, own[lane].distance_m);
+            let is_alike = (own_m == 0.0) | ((distance_m - own_m).abs() < ALIKE * own_m);
+            (distance_m > 0.0) & is_alike
+        });
+        let counted =
+            |lane: usize, value: f32, else_: f32| if votes_for_it[lane] { value } else { else_ };
+        *levels_m = std::array::from_fn(|lane| counted(lane, rings[lane].level_m, f32::INFINITY));
+        total_m =
+            std::array::from_fn(|lane| total_m[lane] + counted(lane, rings[lane].distance_m, 0.0));
+        votes = std::array::from_fn(|lane| votes[lane] + counted(lane, 1.0, 0.0));
+    }
+    sort(&mut levels_m);
+    std::array::from_fn(|lane| {
+        let votes = votes[lane];
+        let is_seen = own[lane].distance_m > 0.0;
+        if votes >= FEWEST_VOTES || votes > 0.0 && is_seen {
+            Ring {
+                distance_m: total_m[lane] / votes,
+                level_m: levels_m[votes as usize / 2][lane],
+            }
+        } else {
+            Ring::default()
+        }
+    })
+}
+
 /// Sorts the levels of each layer, lowest first, by exchanging neighbours in turns.
 #[inline(always)]
-fn sort(levels_m: &mut [[f32; MAX_LAYERS]; ALL]) {
+fn sort(levels_m: &mut [[f32; LANES]; ALL]) {
     for turn in 0..ALL {
         for place in (turn % 2..ALL - 1).step_by(2) {
             let [a, b] = [levels_m[place], levels_m[place + 1]];
-            for layer in 0..MAX_LAYERS {
-                levels_m[place][layer] = least(a[layer], b[layer]);
-                levels_m[place + 1][layer] = greatest(a[layer], b[layer]);
-            }
+            levels_m[place] = least_each(a, b);
+            levels_m[place + 1] = greatest_each(a, b);
         }
     }
 }
