@@ -19,16 +19,35 @@ pub(crate) fn greatest<T: PartialOrd>(a: T, b: T) -> T {
 /// masked store, of which some processors do one in thirty cycles.
 pub(crate) const LANES: usize = 8;
 
+/// What is computed of every lane.
+#[inline(always)]
+pub(crate) fn each<T>(of_lane: impl FnMut(usize) -> T) -> [T; LANES] {
+    std::array::from_fn(of_lane)
+}
+
 /// The lesser one of each pair.
 #[inline(always)]
 pub(crate) fn least_each(a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
-    std::array::from_fn(|lane| least(a[lane], b[lane]))
+    each(|lane| least(a[lane], b[lane]))
 }
 
 /// The greater one of each pair.
 #[inline(always)]
 pub(crate) fn greatest_each(a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
-    std::array::from_fn(|lane| greatest(a[lane], b[lane]))
+    each(|lane| greatest(a[lane], b[lane]))
+}
+
+/// Puts a value into each lane of those that are sorted, lowest first; the highest one is dropped.
+#[inline(always)]
+pub(crate) fn insert_each<const N: usize>(
+    sorted: &mut [[f32; LANES]; N],
+    mut values: [f32; LANES],
+) {
+    for sorted in sorted {
+        let lower = least_each(*sorted, values);
+        values = greatest_each(*sorted, values);
+        *sorted = lower;
+    }
 }
 
 /// The least of a power of two of numbers, of which none is NaN.

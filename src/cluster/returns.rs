@@ -6,7 +6,7 @@ use multiversion::multiversion;
 
 use super::ClusterParameters;
 use crate::cloud::{MAX_LAYERS, Scan};
-use crate::float::{LANES, least, least_each, least_of};
+use crate::float::{LANES, each, least, least_each, least_of};
 
 /// All points of a revolution, in array order. Nothing is a neighbour of those that are not looked
 /// at.
@@ -200,7 +200,7 @@ fn count(returns: &Returns<'_>, columns: &Range<usize>, layer: usize, centre: &C
     for column in 0..stretch.x_m.len() {
         let (squared, most) = stretch.compared(column, centre);
         let near = |lane| f32::from(squared[lane] <= most[lane]);
-        found = std::array::from_fn(|lane| found[lane] + near(lane));
+        found = each(|lane| found[lane] + near(lane));
     }
     found.iter().sum::<f32>() as u32
 }
@@ -217,7 +217,7 @@ fn squared_to_nearest(
     let mut nearest = [f32::INFINITY; LANES];
     for column in 0..stretch.x_m.len() {
         let (squared, most) = stretch.compared(column, centre);
-        let near = std::array::from_fn(|lane| {
+        let near = each(|lane| {
             if squared[lane] <= most[lane] {
                 squared[lane]
             } else {

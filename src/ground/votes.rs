@@ -4,7 +4,7 @@ use multiversion::multiversion;
 
 use super::surface::Ring;
 use crate::cloud::MAX_LAYERS;
-use crate::float::{LANES, greatest_each, least_each};
+use crate::float::{LANES, each, insert_each};
 
 /// Sectors to either side that vote on a level.
 pub(super) const VOTERS: usize = 3;
@@ -31,46 +31,42 @@ pub(super) fn elected(voters: &[[Ring; MAX_LAYERS]; ALL]) -> [Ring; MAX_LAYERS] 
 #[inline(always)]
 fn elected_of_half(voters: [&[Ring; LANES]; ALL]) -> [Ring; LANES] {
     let own = voters[VOTERS];
-    let mut levels_m = [[f32::INFINITY; LANES]; ALL];
+    let mut sorted_m = [[f32::INFINITY; LANES]; ALL];
     let (mut total_m, mut votes) = ([0.0; LANES], [0.0; LANES]);
-    for (rings, levels_m) in voters.into_iter().zip(&mut levels_m) {
-        let votes_for_it: [bool; LANES] = std::array::from_fn(|lane| {
+    for rings in voters {
+        let votes_for_it: [bool; LANES] = each(|lane| {
             let (distance_m, own_m) = (rings[lane].distance_m, own[lane].distance_m);
             let is_alike = (own_m == 0.0) | ((distance_m - own_m).abs() < ALIKE * own_m);
             (distance_m > 0.0) & is_alike
         });
-        let counted =
-            |lane: usize, value: f32, else_: f32| if votes_for_it[lane] { value } else { else_ };
-        *levels_m = std::array::from_fn(|lane| counted(lane, rings[lane].level_m, f32::INFINITY));
-        total_m =
-            std::array::from_fn(|lane| total_m[lane] + counted(lane, rings[lane].distance_m, 0.0));
-        votes = std::array::from_fn(|lane| votes[lane] + counted(lane, 1.0, 0.0));
+        let voted = |lane, value, otherwise| if votes_for_it[lane] { value } else { otherwise };
+        let levels_m = each(|lane| voted(lane, rings[lane].level_m, f32::INFINITY));
+        insert_each(&mut sorted_m, levels_m);
+        total_m = each(|lane| total_m[lane] + voted(lane, rings[lane].distance_m, 0.0));
+        votes = each(|lane| votes[lane] + voted(lane, 1.0, 0.0));
     }
-    sort(&mut levels_m);
-    std::array::from_fn(|lane| {
-        let votes = votes[lane];
+    let mut median_m = sorted_m[0];
+    for (levels_m, place) in sorted_m.iter().zip(0u8..) {
+        let is_below = |lane| votes[lane] >= f32::from(2 * place);
+        median_m = each(|lane| {
+            if is_below(lane) {
+                levels_m[lane]
+            } else {
+                median_m[lane]
+            }
+        });
+    }
+    each(|lane| {
         let is_seen = own[lane].distance_m > 0.0;
-        if votes >= FEWEST_VOTES || votes > 0.0 && is_seen {
+        if votes[lane] >= FEWEST_VOTES || votes[lane] > 0.0 && is_seen {
             Ring {
-                distance_m: total_m[lane] / votes,
-                level_m: levels_m[votes as usize / 2][lane],
+                distance_m: total_m[lane] / votes[lane],
+                level_m: median_m[lane],
             }
         } else {
             Ring::default()
         }
     })
-}
-
-/// Sorts the levels of each layer, lowest first, by exchanging neighbours in turns.
-#[inline(always)]
-fn sort(levels_m: &mut [[f32; LANES]; ALL]) {
-    for turn in 0..ALL {
-        for place in (turn % 2..ALL - 1).step_by(2) {
-            let [a, b] = [levels_m[place], levels_m[place + 1]];
-            levels_m[place] = least_each(a, b);
-            levels_m[place + 1] = greatest_each(a, b);
-        }
-    }
 }
 
 #[cfg(test)]
