@@ -37,19 +37,6 @@ pub(crate) fn greatest_each(a: [f32; LANES], b: [f32; LANES]) -> [f32; LANES] {
     each(|lane| greatest(a[lane], b[lane]))
 }
 
-/// Puts a value into each lane of those that are sorted, lowest first; the highest one is dropped.
-#[inline(always)]
-pub(crate) fn insert_each<const N: usize>(
-    sorted: &mut [[f32; LANES]; N],
-    mut values: [f32; LANES],
-) {
-    for sorted in sorted {
-        let lower = least_each(*sorted, values);
-        values = greatest_each(*sorted, values);
-        *sorted = lower;
-    }
-}
-
 /// The least of a power of two of numbers, of which none is NaN.
 #[inline(always)]
 pub(crate) fn least_of<const N: usize>(values: [f32; N]) -> f32 {

@@ -303,7 +303,11 @@ impl Scan {
 
     /// How many points have a return that is used.
     pub fn returns(&self) -> usize {
-        self.range_m().iter().filter(|range| **range > 0.0).count()
+        let returns = self
+            .range_m()
+            .iter()
+            .map(|range_m| u32::from(*range_m > 0.0));
+        returns.sum::<u32>() as usize
     }
 }
 

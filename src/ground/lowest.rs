@@ -7,7 +7,7 @@ use multiversion::multiversion;
 use super::SECTORS;
 use super::surface::STEEPEST;
 use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, Scan};
-use crate::float::{LANES, each, insert_each};
+use crate::float::{LANES, each, greatest_each, least_each};
 
 /// The points of a revolution.
 pub(super) struct Points<'a> {
@@ -137,9 +137,13 @@ fn keep_lowest(
         let mut kept = [[NO_LEVEL_M; LANES]; KEPT];
         let mut count = [0; LANES];
         for row in rows {
-            let row: [f32; LANES] = row.as_chunks().0[half];
+            let mut row: [f32; LANES] = row.as_chunks().0[half];
             count = each(|lane| count[lane] + u32::from(row[lane] < NO_LEVEL_M));
-            insert_each(&mut kept, row);
+            for kept in &mut kept {
+                let lower = least_each(*kept, row);
+                row = greatest_each(*kept, row);
+                *kept = lower;
+            }
         }
         for (lowest, kept) in lowest.iter_mut().zip(kept) {
             lowest.as_chunks_mut().0[half] = kept;

@@ -4,7 +4,7 @@ use multiversion::multiversion;
 
 use super::surface::Ring;
 use crate::cloud::MAX_LAYERS;
-use crate::float::{LANES, each, insert_each};
+use crate::float::{LANES, each};
 
 /// Sectors to either side that vote on a level.
 pub(super) const VOTERS: usize = 3;
@@ -31,31 +31,20 @@ pub(super) fn elected(voters: &[[Ring; MAX_LAYERS]; ALL]) -> [Ring; MAX_LAYERS] 
 #[inline(always)]
 fn elected_of_half(voters: [&[Ring; LANES]; ALL]) -> [Ring; LANES] {
     let own = voters[VOTERS];
-    let mut sorted_m = [[f32::INFINITY; LANES]; ALL];
+    let mut levels_m = [[f32::INFINITY; LANES]; ALL];
     let (mut total_m, mut votes) = ([0.0; LANES], [0.0; LANES]);
-    for rings in voters {
+    for (rings, levels_m) in voters.into_iter().zip(&mut levels_m) {
         let votes_for_it: [bool; LANES] = each(|lane| {
             let (distance_m, own_m) = (rings[lane].distance_m, own[lane].distance_m);
             let is_alike = (own_m == 0.0) | ((distance_m - own_m).abs() < ALIKE * own_m);
             (distance_m > 0.0) & is_alike
         });
         let voted = |lane, value, otherwise| if votes_for_it[lane] { value } else { otherwise };
-        let levels_m = each(|lane| voted(lane, rings[lane].level_m, f32::INFINITY));
-        insert_each(&mut sorted_m, levels_m);
+        *levels_m = each(|lane| voted(lane, rings[lane].level_m, f32::INFINITY));
         total_m = each(|lane| total_m[lane] + voted(lane, rings[lane].distance_m, 0.0));
         votes = each(|lane| votes[lane] + voted(lane, 1.0, 0.0));
     }
-    let mut median_m = sorted_m[0];
-    for (levels_m, place) in sorted_m.iter().zip(0u8..) {
-        let is_below = |lane| votes[lane] >= f32::from(2 * place);
-        median_m = each(|lane| {
-            if is_below(lane) {
-                levels_m[lane]
-            } else {
-                median_m[lane]
-            }
-        });
-    }
+    let median_m = median_of(&levels_m, votes);
     each(|lane| {
         let is_seen = own[lane].distance_m > 0.0;
         if votes[lane] >= FEWEST_VOTES || votes[lane] > 0.0 && is_seen {
@@ -67,6 +56,30 @@ fn elected_of_half(voters: [&[Ring; LANES]; ALL]) -> [Ring; LANES] {
             Ring::default()
         }
     })
+}
+
+/// The median of as many levels of each layer as there are votes; the others are infinite. At most
+/// half of the votes are below it, and more than half are not above.
+#[inline(always)]
+fn median_of(levels_m: &[[f32; LANES]; ALL], votes: [f32; LANES]) -> [f32; LANES] {
+    let mut median_m = levels_m[0];
+    for level_m in levels_m {
+        let (mut below, mut not_above) = ([0.0; LANES], [0.0; LANES]);
+        for other_m in levels_m {
+            below = each(|lane| below[lane] + f32::from(other_m[lane] < level_m[lane]));
+            not_above = each(|lane| not_above[lane] + f32::from(other_m[lane] <= level_m[lane]));
+        }
+        median_m = each(|lane| {
+            let half = 0.5 * votes[lane];
+            let is_median = (below[lane] <= half) & (half < not_above[lane]);
+            if is_median {
+                level_m[lane]
+            } else {
+                median_m[lane]
+            }
+        });
+    }
+    median_m
 }
 
 #[cfg(test)]

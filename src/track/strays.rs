@@ -12,9 +12,11 @@ use super::spots::Spot;
 use crate::cluster::Clusters;
 use crate::marks::marked;
 
-/// Finds them. Its buffer is made once.
+/// Finds them. Its buffers are made once.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Strays {
+    /// Of every track whether it is seen otherwise.
+    is_seen: Vec<bool>,
     /// Points that are looked at closer.
     marks: Vec<bool>,
 }
@@ -38,14 +40,20 @@ impl Strays {
         let Scene { scan, sweep, .. } = *scene;
         let placement = sweep.sensor.placement();
         let origin_m = placement.origin_m();
+        self.is_seen.clear();
+        self.is_seen.resize(tracks.len(), false);
+        for spot in spots.iter() {
+            if let Some(is_seen) = self.is_seen.get_mut(spot.group as usize) {
+                *is_seen = true;
+            }
+        }
         for (number, track) in tracks.iter().enumerate() {
             if !track.is_confirmed() || !track.is_sparse() || track.rests() {
                 continue;
             }
             let place = track.rectangle();
             // Who is seen otherwise is there; of who is not, nobody knows where.
-            let is_seen = spots.iter().any(|spot| spot.group == number as u32);
-            let (near_m, more_m) = if track.is_hardly_met() && !is_seen {
+            let (near_m, more_m) = if track.is_hardly_met() && !self.is_seen[number] {
                 let near_m = track.spread_m().clamp(NEAR_M, FARTHEST_M);
                 (near_m, near_m)
             } else {

@@ -5,6 +5,8 @@
 //! wire type of field 7 tells them apart. Byte order is not in the message at all: it is
 //! found from the distances ([`CompactPointCloud::roughness`]).
 
+use multiversion::multiversion;
+
 use super::WireError;
 use super::message::FieldValue;
 use super::protobuf::{Reader, Value, put_key, put_length_delimited, unzigzag};
@@ -240,7 +242,7 @@ impl<'a> CompactPointCloud<'a> {
         const LEAST_PAIRS: u64 = 4;
         let mut columns = self.column_bytes()?;
         let (first, last) = (columns.next()?, columns.next_back()?);
-        let (seam, seam_pairs) = self.difference(last, first, order);
+        let (seam, seam_pairs) = difference(last, first, order, self.distance_mask());
         let (inner, inner_pairs) = self.inner_difference(order);
         if seam_pairs < LEAST_PAIRS || inner_pairs < LEAST_PAIRS {
             return None;
@@ -257,29 +259,41 @@ impl<'a> CompactPointCloud<'a> {
 
     /// Sum and number of differences over every eighth pair of neighbouring columns.
     fn inner_difference(&self, order: ByteOrder) -> (u64, u64) {
-        const PAIR_STRIDE: usize = 8;
-        let (Some(left), Some(right)) = (self.column_bytes(), self.column_bytes()) else {
-            return (0, 0);
-        };
-        left.zip(right.skip(1))
-            .step_by(PAIR_STRIDE)
-            .map(|(left, right)| self.difference(left, right, order))
-            .fold((0, 0), |total, pair| (total.0 + pair.0, total.1 + pair.1))
+        let length = 2 * usize::from(self.layers);
+        inner_difference(self.distances, length, order, self.distance_mask())
     }
+}
 
-    /// Sum and number of differences between two columns, where both return.
-    fn difference(&self, left: &[u8], right: &[u8], order: ByteOrder) -> (u64, u64) {
-        let mask = self.distance_mask();
-        let distance = |bytes: &[u8]| order.join([bytes[0], bytes[1]]) & mask;
-        left.chunks_exact(2)
-            .zip(right.chunks_exact(2))
-            .map(|(left, right)| (distance(left), distance(right)))
-            .filter(|(left, right)| *left != 0 && *right != 0)
-            .map(|(left, right)| u64::from(left.abs_diff(right)))
-            .fold((0, 0), |(sum, pairs), difference| {
-                (sum + difference, pairs + 1)
-            })
+/// Sum and number of differences over every eighth pair of neighbouring columns of so many bytes.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn inner_difference(distances: &[u8], length: usize, order: ByteOrder, mask: u16) -> (u64, u64) {
+    const PAIR_STRIDE: usize = 8;
+    if length == 0 {
+        return (0, 0);
     }
+    let pairs = distances.windows(2 * length).step_by(PAIR_STRIDE * length);
+    let differences = pairs.map(|pair| {
+        let (left, right) = pair.split_at(length);
+        difference(left, right, order, mask)
+    });
+    differences.fold((0, 0), |total, pair| (total.0 + pair.0, total.1 + pair.1))
+}
+
+/// Sum and number of differences between two columns, where both return.
+#[inline(always)]
+fn difference(left: &[u8], right: &[u8], order: ByteOrder, mask: u16) -> (u64, u64) {
+    let (mut sum, mut pairs) = (0u32, 0u32);
+    for (left, right) in left.as_chunks().0.iter().zip(right.as_chunks().0) {
+        let [left, right] = [left, right].map(|bytes| order.join(*bytes) & mask);
+        let both = (left != 0) & (right != 0);
+        sum += if both {
+            u32::from(left.abs_diff(right))
+        } else {
+            0
+        };
+        pairs += u32::from(both);
+    }
+    (u64::from(sum), u64::from(pairs))
 }
 
 impl IntensityPlacement {
