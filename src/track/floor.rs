@@ -72,21 +72,26 @@ impl Floor {
         find_places(self, x_m, y_m, places);
     }
 
-    /// Adds the cell at a place, if it is not there yet.
-    #[inline(always)]
-    pub(super) fn add(&mut self, place: u32) {
-        let number = &mut self.numbers[place as usize];
-        if *number == 0 {
-            self.places.push(place);
-            *number = self.places.len() as u32;
+    /// Adds the cells at those of some places that count, each of them once.
+    pub(super) fn add(&mut self, places: impl ExactSizeIterator<Item = (u32, bool)>) {
+        let mut count = self.places.len();
+        self.places.resize(count + places.len(), 0);
+        for (place, counts) in places {
+            // Written in any case, and kept if it is new: nobody could foresee the branch.
+            self.places[count] = place;
+            let number = &mut self.numbers[place as usize];
+            let is_new = counts & (*number == 0);
+            count += usize::from(is_new);
+            *number = if is_new { count as u32 } else { *number };
         }
+        self.places.truncate(count);
     }
 
-    /// The number of the cell at a place, if there is one: counted from 0 in the order in which
-    /// they were added.
+    /// One more than the number of the cell at a place, 0 where there is none: counted from 0 in
+    /// the order in which they were added, and once they are named by their parts that of the part.
     #[inline(always)]
-    pub(super) fn number(&self, place: u32) -> Option<usize> {
-        (self.numbers[place as usize] as usize).checked_sub(1)
+    pub(super) fn number(&self, place: u32) -> u32 {
+        self.numbers[place as usize]
     }
 
     /// How many cells there are.
@@ -100,8 +105,8 @@ impl Floor {
         for (number, place) in self.places.iter().enumerate() {
             let east = place + self.height;
             for neighbour in [place + 1, east - 1, east, east + 1] {
-                if let Some(other) = self.number(neighbour) {
-                    self.partition.join(number as u32, other as u32);
+                if let Some(other) = self.number(neighbour).checked_sub(1) {
+                    self.partition.join(number as u32, other);
                 }
             }
         }
@@ -113,12 +118,6 @@ impl Floor {
         for (place, part) in self.places.iter().zip(self.partition.parents()) {
             self.numbers[*place as usize] = part + 1;
         }
-    }
-
-    /// One more than the part of the cell at a place, once it is named; 0 where there is none.
-    #[inline(always)]
-    pub(super) fn name(&self, place: u32) -> u32 {
-        self.numbers[place as usize]
     }
 
     /// For each cell the part that it belongs to: the first cell of that.
@@ -146,25 +145,25 @@ mod tests {
         // What was there before is gone.
         for cell_m in [0.1, 0.3] {
             floor.begin([2.0, 2.0], [4.0, 2.9], cell_m, [0.0; 2]);
-            for at_m in at_m {
-                floor.add(floor.place(at_m));
-                floor.add(floor.place(at_m));
-            }
+            let places = at_m.map(|at_m| floor.place(at_m));
+            floor.add(places.into_iter().map(|place| (place, true)));
+            floor.add(places.into_iter().map(|place| (place, true)));
             floor.join();
         }
         assert_eq!(floor.len(), 5);
         assert_eq!(floor.parts(), [0, 0, 2, 0, 0]);
-        assert_eq!(floor.number(floor.place([2.3, 2.9])), Some(3));
-        assert_eq!(floor.number(floor.place([3.5, 2.0])), None);
+        assert_eq!(floor.number(floor.place([2.3, 2.9])), 4);
+        assert_eq!(floor.number(floor.place([3.5, 2.0])), 0);
+        floor.add([(floor.place([3.5, 2.0]), false)].into_iter());
+        assert_eq!(floor.len(), 5);
     }
 
     #[test]
     fn what_is_too_far_for_the_floor_falls_into_its_last_cell() {
         let mut floor = Floor::default();
         floor.begin([0.0; 2], [1e6, 5.0], 0.3, [7.0; 2]);
-        for at_m in [[1e6, 5.0], [1e5, 5.0], [0.0, 0.0]] {
-            floor.add(floor.place(at_m));
-        }
+        let places = [[1e6, 5.0], [1e5, 5.0], [0.0, 0.0]].map(|at_m| floor.place(at_m));
+        floor.add(places.into_iter().map(|place| (place, true)));
         floor.join();
         assert_eq!(floor.len(), 2);
     }

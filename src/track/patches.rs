@@ -57,7 +57,7 @@ pub(super) struct Placer {
     floor: Floor,
     /// Where on it each return lies.
     places: Vec<u32>,
-    /// Whether there is more above each cell.
+    /// Whether there is more above each cell, after that of where there is none.
     covered: Vec<bool>,
     /// That of what belongs to none, and all others.
     parts: Vec<Part>,
@@ -215,11 +215,9 @@ impl Placer {
             .begin(whole.low_m, whole.high_m, cell_m, self.origin_m);
         self.floor
             .find_places(self.cluster.at_m(), &mut self.places);
-        for (place, above_m) in self.places.iter().zip(self.cluster.above_m()) {
-            if is_at_body_height(*above_m) {
-                self.floor.add(*place);
-            }
-        }
+        let places = self.places.iter().zip(self.cluster.above_m());
+        self.floor
+            .add(places.map(|(place, above_m)| (*place, is_at_body_height(*above_m))));
         self.floor.join();
         self.count_cells(is_too_tall, whole.top_m);
         self.assign(whole.top_m);
@@ -230,24 +228,19 @@ impl Placer {
     fn count_cells(&mut self, is_too_tall: bool, top_m: f32) {
         let cells = self.floor.len();
         self.covered.clear();
-        self.covered.resize(cells, false);
-        let ranges_m = self.cluster.range_m().iter();
-        let own = self
-            .cluster
-            .above_m()
-            .iter()
-            .zip(ranges_m.zip(&self.places));
-        for (above_m, (range_m, place)) in own.filter(|_| top_m > CUT_M) {
-            if *above_m > CUT_M
-                && *above_m < CUT_M + greatest(ABOVE_CUT_M, ABOVE_CUT_PER_M * range_m)
-                && let Some(cell) = self.floor.number(*place)
-            {
-                self.covered[cell] = true;
+        self.covered.resize(1 + cells, false);
+        if top_m > CUT_M {
+            let heights_m = self.cluster.above_m().iter();
+            let others = self.cluster.range_m().iter().zip(&self.places);
+            for (above_m, (range_m, place)) in heights_m.zip(others) {
+                let most_m = CUT_M + greatest(ABOVE_CUT_M, ABOVE_CUT_PER_M * range_m);
+                let cell = self.floor.number(*place) as usize;
+                self.covered[cell] |= (*above_m > CUT_M) & (*above_m < most_m);
             }
         }
         self.parts.clear();
         self.parts.resize(1 + cells, Part::EMPTY);
-        for (part, is_covered) in self.floor.parts().iter().zip(&self.covered) {
+        for (part, is_covered) in self.floor.parts().iter().zip(&self.covered[1..]) {
             let part = &mut self.parts[1 + *part as usize];
             part.cells += 1;
             part.covered += u32::from(*is_covered);
@@ -262,30 +255,19 @@ impl Placer {
     fn assign(&mut self, top_m: f32) {
         self.floor.name_by_parts();
         self.part_of.clear();
-        let ranges_m = self.cluster.range_m();
-        let own = self.cluster.above_m().iter().zip(&self.places);
-        let own = own.zip(self.cluster.points().iter().zip(ranges_m));
-        // The last return: its point, its part, and its range.
-        let mut below = (u32::MAX, NO_PART, 0.0);
-        self.part_of
-            .extend(own.map(|((above_m, place), (point, range_m))| {
-                let (point_below, part_below, range_below_m) = below;
-                let number = self.floor.name(*place);
-                let goes_on = top_m < VAN_TOP_M
-                    && *above_m > CUT_M
-                    && is_below(point_below, *point)
-                    && (range_m - range_below_m).abs() < SAME_M;
-                let part = if *above_m <= self.parts[number as usize].cut_m {
-                    number
-                } else if goes_on {
-                    part_below
-                } else {
-                    NO_PART
-                };
-                self.parts[part as usize].place += usize::from(part != NO_PART);
-                below = (*point, part, *range_m);
-                part
-            }));
+        let own = self.places.iter().zip(self.cluster.above_m());
+        self.part_of.extend(own.map(|(place, above_m)| {
+            let number = self.floor.number(*place);
+            let is_its = *above_m <= self.parts[number as usize].cut_m;
+            if is_its { number } else { NO_PART }
+        }));
+        if (CUT_M..VAN_TOP_M).contains(&top_m) {
+            self.assign_roofs();
+        }
+        for part in &self.part_of {
+            self.parts[*part as usize].place += 1;
+        }
+        self.parts[NO_PART as usize].place = 0;
         let mut next = self.placed.len();
         for part in &mut self.parts {
             next += std::mem::replace(&mut part.place, next);
@@ -293,15 +275,33 @@ impl Placer {
         self.placed.resize(next, Placed::default());
     }
 
-    /// Puts the returns of every part side by side, and makes the parts patches.
-    fn sort(&mut self, is_too_tall: bool) {
-        for (placed, part) in self.cluster.iter().zip(&self.part_of) {
-            if *part != NO_PART {
-                let place = &mut self.parts[*part as usize].place;
-                self.placed[*place] = placed;
-                *place += 1;
+    /// Gives what is above the cut, and goes on from the return below, the part of that.
+    fn assign_roofs(&mut self) {
+        let (above_m, range_m) = (self.cluster.above_m(), self.cluster.range_m());
+        let points = self.cluster.points();
+        for place in 1..points.len() {
+            if self.part_of[place] == NO_PART
+                && above_m[place] > CUT_M
+                && is_below(points[place - 1], points[place])
+                && (range_m[place] - range_m[place - 1]).abs() < SAME_M
+            {
+                self.part_of[place] = self.part_of[place - 1];
             }
         }
+    }
+
+    /// Puts the returns of every part side by side, and makes the parts patches.
+    fn sort(&mut self, is_too_tall: bool) {
+        // What belongs to none goes behind all others, again and again to the same place.
+        let end = self.placed.len();
+        self.placed.push(Placed::default());
+        self.parts[NO_PART as usize].place = end;
+        for (placed, part) in self.cluster.iter().zip(&self.part_of) {
+            let place = &mut self.parts[*part as usize].place;
+            self.placed[*place] = placed;
+            *place += usize::from(*part != NO_PART);
+        }
+        self.placed.truncate(end);
         // Each part now ends where the next one begins.
         for part in &self.parts[1..] {
             let begin = self.patches.last().map_or(0, |patch| patch.end);
