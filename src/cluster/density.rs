@@ -43,19 +43,21 @@ const FOLLOWING: usize = MAX_LAYERS;
 /// In the next layer.
 const ABOVE: usize = 1;
 /// Pairs that are counted: how many columns and how many places of the array they are apart. They
-/// are those on a surface that suffice, four columns along a layer and three points of the next
-/// one.
-const PAIRS: [(usize, usize); 7] = [
+/// are those on a surface that suffice, six columns along a layer and three points of the next one:
+/// the last two columns leave a third fewer open.
+const PAIRS: [(usize, usize); 9] = [
     (1, FOLLOWING),
     (2, 2 * MAX_LAYERS),
     (3, 3 * MAX_LAYERS),
     (4, 4 * MAX_LAYERS),
+    (5, 5 * MAX_LAYERS),
+    (6, 6 * MAX_LAYERS),
     (0, ABOVE),
     (1, MAX_LAYERS + 1),
     (1, MAX_LAYERS - 1),
 ];
 /// No pair reaches beyond the next chunk.
-const _: () = assert!(CHUNK > 4 * MAX_LAYERS);
+const _: () = assert!(CHUNK > 6 * MAX_LAYERS);
 
 impl Density {
     pub(super) fn new() -> Self {
