@@ -1,6 +1,9 @@
-//! What the standard library's floats do only with care for NaN, and therefore slowly.
+//! Floats, many at once: what the standard library does only with care for NaN, and therefore
+//! slowly.
 
 use multiversion::multiversion;
+
+use crate::cloud::MAX_LAYERS;
 
 /// The lesser of two numbers, of which none is NaN: one instruction for many at once.
 #[inline(always)]
@@ -14,10 +17,12 @@ pub(crate) fn greatest<T: PartialOrd>(a: T, b: T) -> T {
     if a > b { a } else { b }
 }
 
-/// Numbers that a register holds: arrays of so many stay in registers while they are summed up or
-/// compared. What is written over in memory under a condition, be it that of [`least`], becomes a
-/// masked store, of which some processors do one in thirty cycles.
+/// Floats that one register holds. Arrays of so many that are replaced as a whole, as [`each`] does,
+/// stay in registers. What is written over in memory under a condition, be it that of [`least`],
+/// becomes a masked store, of which some processors do one in thirty cycles.
 pub(crate) const LANES: usize = 8;
+/// The layers of a column are two halves of so many.
+const _: () = assert!(MAX_LAYERS == 2 * LANES);
 
 /// What is computed of every lane.
 #[inline(always)]
@@ -105,7 +110,7 @@ mod tests {
     #[test]
     fn bounds_hold_all_numbers_wherever_the_outermost_stand() {
         assert_eq!(bounds_of(&[]), [f32::INFINITY, f32::NEG_INFINITY]);
-        for count in [1, 7, 8, 16, 29] {
+        for count in [1, 7, 15, 16, 29, 53] {
             for (low, high) in [(0, count - 1), (count - 1, 0), (count / 2, count / 3)] {
                 let mut values = vec![1.5; count];
                 values[high] = 4.0;

@@ -35,7 +35,7 @@ impl Bounds {
 
     /// Grows around a point: x, y, z, and range.
     #[inline(always)]
-    pub(super) fn hold(&mut self, point_m: [f32; AXES]) {
+    pub(super) fn hold(&mut self, point_m: Corner) {
         self.hold_all(&Self {
             low_m: point_m,
             high_m: point_m,
@@ -209,5 +209,8 @@ mod tests {
         assert_eq!(bounds.squared_distance_to([5.0, 9.0, 1.0]), 1.0 + 4.0);
         assert_eq!(bounds.nearest_m(), 3.0);
         assert_eq!(bounds.eps_m(&parameters), 0.5 + 0.022 * 8.0);
+        bounds.hold([2.0; AXES]);
+        bounds.hold([9.0; AXES]);
+        assert_eq!((bounds.low_m, bounds.high_m), ([2.0; AXES], [9.0; AXES]));
     }
 }

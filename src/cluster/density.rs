@@ -43,8 +43,8 @@ const FOLLOWING: usize = MAX_LAYERS;
 /// In the next layer.
 const ABOVE: usize = 1;
 /// Pairs that are counted: how many columns and how many places of the array they are apart. They
-/// are those on a surface that suffice, six columns along a layer and three points of the next one:
-/// the last two columns leave a third fewer open.
+/// are those on a surface that suffice, six columns along a layer and three points of the next one.
+/// With four columns half as many again would be open.
 const PAIRS: [(usize, usize); 9] = [
     (1, FOLLOWING),
     (2, 2 * MAX_LAYERS),
@@ -242,7 +242,8 @@ fn judge(
 fn keep_core(eps_squared: &mut [f32], is_core: &[bool]) {
     let is_core = &is_core[..eps_squared.len()];
     for point in 0..eps_squared.len() {
-        // The sign alone makes it negative: a choice would be a masked store.
+        // Only the sign changes: a choice between what is there and another value would be a
+        // masked store.
         let sign = u32::from(!is_core[point]) << (u32::BITS - 1);
         eps_squared[point] = f32::from_bits(eps_squared[point].to_bits() | sign);
     }

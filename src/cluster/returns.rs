@@ -195,7 +195,7 @@ impl<'a> Stretch<'a> {
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn count(returns: &Returns<'_>, columns: &Range<usize>, layer: usize, centre: &Centre) -> u32 {
     let stretch = Stretch::of(returns, columns, layer);
-    // Sums of floats keep their order: columns are not turned into lanes.
+    // Counted in floats: sums of integers would be reordered, and columns put into lanes.
     let mut found = [0.0; LANES];
     for column in 0..stretch.x_m.len() {
         let (squared, most) = stretch.compared(column, centre);

@@ -157,6 +157,7 @@ impl Runs {
         self.runs.push(Run {
             layer: layer as u8,
             columns: column..column,
+            // Found when it ends.
             bounds: Bounds::NONE,
         });
     }

@@ -159,8 +159,11 @@ mod tests {
 
     #[test]
     fn the_low_column_is_the_fifth_part_from_below() {
-        // 20 columns of a flat layer, of which each is a little lower than the one before.
-        let scan = scan_of(1800, |_, layer| if layer == 3 { 1000 } else { 0 });
+        // 20 columns of two flat layers, of which each is a little lower than the one before.
+        let scan = scan_of(1800, |_, layer| match layer {
+            3 | 11 => 1000,
+            _ => 0,
+        });
         let heights_m: Vec<f32> = (0..scan.len())
             .map(|point| -0.01 * scan.column(point) as f32)
             .collect();
@@ -173,14 +176,14 @@ mod tests {
         let mut lowest = Lowest::new();
         lowest.note(&points, 100..120);
         lowest.sort();
-        assert_eq!(lowest.low_column(3), Some(15));
+        assert_eq!([3, 11].map(|layer| lowest.low_column(layer)), [Some(15); 2]);
         assert_eq!(lowest.low_column(4), None);
         // What is taken out does not count.
         for level_m in &mut lowest.note(&points, 100..120)[10..] {
             *level_m = [NO_LEVEL_M; MAX_LAYERS];
         }
         lowest.sort();
-        assert_eq!(lowest.low_column(3), Some(7));
+        assert_eq!([3, 11].map(|layer| lowest.low_column(layer)), [Some(7); 2]);
     }
 
     #[test]

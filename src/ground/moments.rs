@@ -15,13 +15,11 @@ pub(super) struct Positions<'a> {
     pub(super) z_m: &'a [f32],
 }
 
-/// Positions that are looked at together: a column.
-const LANES: usize = MAX_LAYERS;
 /// Sums that take turns, so that none waits for itself.
 const TURNS: usize = 2;
 
 /// Sums of each lane; their order is that of the fields of [`Moments`].
-type Sums = [[f32; LANES]; 9];
+type Sums = [[f32; MAX_LAYERS]; 9];
 
 /// The moments of the points within `near_m` of a plane, and no farther than the root of
 /// `far_squared` away; of every so many columns, one is looked at.
@@ -35,12 +33,12 @@ pub(super) fn moments_near(
 ) -> Moments {
     let [a, b, c] = plane.normal().map(|component| component as f32);
     let height_m = plane.height_m() as f32;
-    let mut sums: [Sums; TURNS] = [[[0.0; LANES]; 9]; TURNS];
+    let mut sums: [Sums; TURNS] = [[[0.0; MAX_LAYERS]; 9]; TURNS];
     let count = points.x_m.len();
     let (x_m, y_m, z_m) = (points.x_m, &points.y_m[..count], &points.z_m[..count]);
-    let (x_m, last_x) = x_m.as_chunks::<LANES>();
-    let (y_m, last_y) = y_m.as_chunks::<LANES>();
-    let (z_m, last_z) = z_m.as_chunks::<LANES>();
+    let (x_m, last_x) = x_m.as_chunks::<MAX_LAYERS>();
+    let (y_m, last_y) = y_m.as_chunks::<MAX_LAYERS>();
+    let (z_m, last_z) = z_m.as_chunks::<MAX_LAYERS>();
     let last = [last_x, last_y, last_z].map(padded);
     let mut column = 0;
     while column <= x_m.len() {
@@ -50,9 +48,9 @@ pub(super) fn moments_near(
             last
         };
         let sums = &mut sums[column / every % TURNS];
-        let (mut weight, mut x_near) = ([0.0; LANES], [0.0; LANES]);
-        let (mut y_near, mut z_near) = ([0.0; LANES], [0.0; LANES]);
-        for lane in 0..LANES {
+        let (mut weight, mut x_near) = ([0.0; MAX_LAYERS], [0.0; MAX_LAYERS]);
+        let (mut y_near, mut z_near) = ([0.0; MAX_LAYERS], [0.0; MAX_LAYERS]);
+        for lane in 0..MAX_LAYERS {
             let above_m = a * x[lane] + b * y[lane] + c * z[lane] + height_m;
             let squared = x[lane] * x[lane] + y[lane] * y[lane];
             let is_near = (above_m.abs() <= near_m) & (squared <= far_squared) & (squared > 0.0);
@@ -92,8 +90,8 @@ pub(super) fn moments_near(
 
 /// Adds products of numbers to the sums of their lanes.
 #[inline(always)]
-fn add(sums: &mut [f32; LANES], a: &[f32; LANES], b: &[f32; LANES]) {
-    for lane in 0..LANES {
+fn add(sums: &mut [f32; MAX_LAYERS], a: &[f32; MAX_LAYERS], b: &[f32; MAX_LAYERS]) {
+    for lane in 0..MAX_LAYERS {
         sums[lane] += a[lane] * b[lane];
     }
 }
@@ -106,7 +104,7 @@ pub(super) fn squared_distances(points: Positions<'_>, plane: &Plane, most: f32)
     let height_m = plane.height_m() as f32;
     let count = points.x_m.len();
     let (x_m, y_m, z_m) = (points.x_m, &points.y_m[..count], &points.z_m[..count]);
-    let mut sums = [0.0f32; LANES];
+    let mut sums = [0.0f32; MAX_LAYERS];
     let mut begin = 0;
     let mut squared = [0.0f32; BLOCK];
     while begin < count {
@@ -117,8 +115,8 @@ pub(super) fn squared_distances(points: Positions<'_>, plane: &Plane, most: f32)
             squared[point] = least(above_m * above_m, most);
         }
         squared[end - begin..].fill(0.0);
-        for column in squared.as_chunks::<LANES>().0 {
-            for lane in 0..LANES {
+        for column in squared.as_chunks::<MAX_LAYERS>().0 {
+            for lane in 0..MAX_LAYERS {
                 sums[lane] += column[lane];
             }
         }
@@ -132,8 +130,8 @@ const BLOCK: usize = 512;
 
 /// A column that holds the last few points.
 #[inline(always)]
-fn padded(last: &[f32]) -> [f32; LANES] {
-    let mut column = [0.0; LANES];
+fn padded(last: &[f32]) -> [f32; MAX_LAYERS] {
+    let mut column = [0.0; MAX_LAYERS];
     column[..last.len()].copy_from_slice(last);
     column
 }
@@ -174,7 +172,7 @@ mod tests {
 
     #[test]
     fn the_plane_is_that_of_the_points_that_are_near() {
-        for count in [3 * LANES, 1000, 1007] {
+        for count in [3 * MAX_LAYERS, 1000, 1007] {
             let points = points(count);
             let plane = Plane::level(1.8);
             let [x_m, y_m, z_m] = [0, 1, 2].map(|axis| points[axis].as_slice());

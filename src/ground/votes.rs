@@ -27,7 +27,7 @@ pub(super) fn elected(voters: &[[Ring; MAX_LAYERS]; ALL]) -> [Ring; MAX_LAYERS] 
     elected
 }
 
-/// The same of as many layers as are looked at at once.
+/// The same of one half of the layers.
 #[inline(always)]
 fn elected_of_half(voters: [&[Ring; LANES]; ALL]) -> [Ring; LANES] {
     let own = voters[VOTERS];
@@ -59,7 +59,8 @@ fn elected_of_half(voters: [&[Ring; LANES]; ALL]) -> [Ring; LANES] {
 }
 
 /// The median of as many levels of each layer as there are votes; the others are infinite. At most
-/// half of the votes are below it, and more than half are not above.
+/// half of the votes are below it, and more than half are not above: of two in the middle it is the
+/// upper one. Without votes it is infinite.
 #[inline(always)]
 fn median_of(levels_m: &[[f32; LANES]; ALL], votes: [f32; LANES]) -> [f32; LANES] {
     let mut median_m = levels_m[0];
@@ -93,16 +94,21 @@ mod tests {
         }
     }
 
-    /// What is elected in one layer, given what all sectors see there.
+    /// What is elected in two layers, of either half one, given what all sectors see in both.
     fn of_layer(seen: [Ring; ALL]) -> Ring {
+        let layers = [5, 13];
         let mut voters = [[Ring::default(); MAX_LAYERS]; ALL];
         for (voter, ring) in voters.iter_mut().zip(seen) {
-            voter[5] = ring;
+            for layer in layers {
+                voter[layer] = ring;
+            }
         }
         let elected = elected(&voters);
-        let others = elected.iter().enumerate().filter(|(layer, _)| *layer != 5);
-        assert!(others.into_iter().all(|(_, ring)| ring.distance_m == 0.0));
-        elected[5]
+        let mut others = (0..MAX_LAYERS).filter(|layer| !layers.contains(layer));
+        assert!(others.all(|layer| elected[layer].distance_m == 0.0));
+        let [a, b] = layers.map(|layer| elected[layer]);
+        assert_eq!((a.distance_m, a.level_m), (b.distance_m, b.level_m));
+        a
     }
 
     #[test]
@@ -124,7 +130,8 @@ mod tests {
     fn a_sector_that_sees_nothing_believes_four_others_and_no_fewer() {
         let mut seen = [ring(10.0, 0.1); ALL];
         (seen[3], seen[0], seen[6]) = (Ring::default(), Ring::default(), ring(30.0, 0.1));
-        assert_eq!(of_layer(seen).distance_m, 14.0);
+        let elected = of_layer(seen);
+        assert_eq!((elected.distance_m, elected.level_m), (14.0, 0.1));
         (seen[5], seen[6]) = (Ring::default(), Ring::default());
         assert_eq!(of_layer(seen).distance_m, 0.0);
         // It believes its own eyes, though.

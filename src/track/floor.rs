@@ -14,7 +14,7 @@ pub(super) struct Floor {
     low_m: [f32; 2],
     /// Cells from south to north, one more than the cluster has on either side.
     height: u32,
-    /// For every place, one more than the number of the cell in it; 0 where there is none.
+    /// For every place what [`Floor::number`] says of it.
     numbers: Vec<u32>,
     /// Places of the cells that there are, in the order in which they were added.
     places: Vec<u32>,
@@ -87,8 +87,9 @@ impl Floor {
         self.places.truncate(count);
     }
 
-    /// One more than the number of the cell at a place, 0 where there is none: counted from 0 in
-    /// the order in which they were added, and once they are named by their parts that of the part.
+    /// One more than the number of the cell at a place, counted from 0 in the order in which they
+    /// were added; after [`Floor::name_by_parts`] one more than that of its part. 0 where there is
+    /// no cell.
     #[inline(always)]
     pub(super) fn number(&self, place: u32) -> u32 {
         self.numbers[place as usize]
@@ -113,7 +114,7 @@ impl Floor {
         self.partition.flatten();
     }
 
-    /// Names the cells by the parts that they belong to; they have no numbers from here on.
+    /// Gives every cell the number of the part that it belongs to, in the place of its own.
     pub(super) fn name_by_parts(&mut self) {
         for (place, part) in self.places.iter().zip(self.partition.parents()) {
             self.numbers[*place as usize] = part + 1;

@@ -57,7 +57,8 @@ pub(super) struct Placer {
     floor: Floor,
     /// Where on it each return lies.
     places: Vec<u32>,
-    /// Whether there is more above each cell, after that of where there is none.
+    /// Whether there is more above each cell, by [`Floor::number`]: the first one is that of all
+    /// that lies in no cell.
     covered: Vec<bool>,
     /// That of what belongs to none, and all others.
     parts: Vec<Part>,
@@ -261,6 +262,7 @@ impl Placer {
             let is_its = *above_m <= self.parts[number as usize].cut_m;
             if is_its { number } else { NO_PART }
         }));
+        // Of what is lower nothing is above the cut, and what is higher is no van.
         if (CUT_M..VAN_TOP_M).contains(&top_m) {
             self.assign_roofs();
         }
@@ -321,7 +323,7 @@ impl Placer {
 
 /// Whether a point is the next one below another in its column.
 fn is_below(below: u32, point: u32) -> bool {
-    !point.is_multiple_of(MAX_LAYERS as u32) && below.wrapping_add(1) == point
+    !point.is_multiple_of(MAX_LAYERS as u32) && below + 1 == point
 }
 
 /// Whether a return may be a road user's below the height at which trees and roofs are cut off,
@@ -373,7 +375,7 @@ mod tests {
 
     #[test]
     fn the_roof_of_a_van_belongs_to_it_and_the_crown_above_a_car_does_not() {
-        // 10 m away layers 8 and 9 pass 2.1 and 2.4 m above the ground; what is met there lies
+        // 10 m away layers 8 to 10 pass 2.1, 2.4 and 2.8 m above the ground; what is met there lies
         // behind the foot of the screen, or a metre behind and above a gap.
         let top_m = |roof_cm: u16, gap: Option<usize>| {
             let (placer, _) = patches(|column, layer| match (column, layer) {
@@ -381,12 +383,13 @@ mod tests {
                 (100..150, 3..7) => 1000,
                 (100..150, 7..9) => 1030,
                 (100..150, 9) => roof_cm,
+                (100..150, 10) => roof_cm + 30,
                 _ => 0,
             });
             let patches = placer.patches().iter();
             patches.map(|patch| patch.bounds.top_m).fold(0.0, f32::max)
         };
-        assert!(top_m(1060, None) > 2.3);
+        assert!(top_m(1060, None) > 2.7);
         assert!(top_m(1060, Some(8)) < CUT_M);
     }
 

@@ -40,13 +40,7 @@ impl Strays {
         let Scene { scan, sweep, .. } = *scene;
         let placement = sweep.sensor.placement();
         let origin_m = placement.origin_m();
-        self.is_seen.clear();
-        self.is_seen.resize(tracks.len(), false);
-        for spot in spots.iter() {
-            if let Some(is_seen) = self.is_seen.get_mut(spot.group as usize) {
-                *is_seen = true;
-            }
-        }
+        self.note_seen(tracks.len(), spots);
         for (number, track) in tracks.iter().enumerate() {
             if !track.is_confirmed() || !track.is_sparse() || track.rests() {
                 continue;
@@ -79,6 +73,18 @@ impl Strays {
                         spots.push(Spot::new(scene, point, offset_m, group));
                     }
                 }
+            }
+        }
+    }
+
+    /// Notes which of so many tracks have spots.
+    fn note_seen(&mut self, tracks: usize, spots: &[Spot]) {
+        self.is_seen.clear();
+        self.is_seen.resize(tracks, false);
+        for spot in spots {
+            // The numbers behind those of tracks are others' groups.
+            if let Some(is_seen) = self.is_seen.get_mut(spot.group as usize) {
+                *is_seen = true;
             }
         }
     }
@@ -119,5 +125,26 @@ fn mark_strays(
             & (ranges_m[point] > 0.0)
             & (heights_m[point] >= low_m)
             & (heights_m[point] < high_m);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_track_is_seen_if_it_has_spots_of_this_revolution() {
+        let spot = |group| Spot {
+            at_m: [0.0; 2],
+            above_m: 0.0,
+            age_s: 0.0,
+            point: 0,
+            group,
+        };
+        let mut strays = Strays::default();
+        strays.note_seen(3, &[spot(1), spot(7)]);
+        assert_eq!(strays.is_seen, [false, true, false]);
+        strays.note_seen(3, &[]);
+        assert_eq!(strays.is_seen, [false; 3]);
     }
 }

@@ -282,6 +282,7 @@ fn inner_difference(distances: &[u8], length: usize, order: ByteOrder, mask: u16
 /// Sum and number of differences between two columns, where both return.
 #[inline(always)]
 fn difference(left: &[u8], right: &[u8], order: ByteOrder, mask: u16) -> (u64, u64) {
+    // No column has more than 255 layers: 32 bits hold the sum.
     let (mut sum, mut pairs) = (0u32, 0u32);
     for (left, right) in left.as_chunks().0.iter().zip(right.as_chunks().0) {
         let [left, right] = [left, right].map(|bytes| order.join(*bytes) & mask);
@@ -397,6 +398,20 @@ mod tests {
             .collect();
         let message = cloud(&distances);
         assert!(message.roughness(ByteOrder::Little) > 10 * message.roughness(ByteOrder::Big));
+    }
+
+    #[test]
+    fn roughness_is_that_of_every_eighth_pair_of_columns_that_both_return() {
+        let column = |column: u16| std::iter::repeat_n((900 + column).to_be_bytes(), 16).flatten();
+        let mut distances: Vec<u8> = (0..64).flat_map(column).collect();
+        assert_eq!(cloud(&distances).roughness(ByteOrder::Big), 8 * 16);
+        // What is left of a column does not count.
+        distances.extend([1, 2, 3]);
+        assert_eq!(cloud(&distances).roughness(ByteOrder::Big), 8 * 16);
+        for odd in distances.chunks_exact_mut(32).skip(1).step_by(2) {
+            odd.fill(0);
+        }
+        assert_eq!(cloud(&distances).roughness(ByteOrder::Big), 0);
     }
 
     #[test]
