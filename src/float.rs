@@ -3,8 +3,6 @@
 
 use multiversion::multiversion;
 
-use crate::cloud::MAX_LAYERS;
-
 /// The lesser of two numbers, of which none is NaN: one instruction for many at once.
 #[inline(always)]
 pub(crate) fn least<T: PartialOrd>(a: T, b: T) -> T {
@@ -21,8 +19,6 @@ pub(crate) fn greatest<T: PartialOrd>(a: T, b: T) -> T {
 /// stay in registers. What is written over in memory under a condition, be it that of [`least`],
 /// becomes a masked store, of which some processors do one in thirty cycles.
 pub(crate) const LANES: usize = 8;
-/// The layers of a column are two halves of so many.
-const _: () = assert!(MAX_LAYERS == 2 * LANES);
 
 /// What is computed of every lane.
 #[inline(always)]

@@ -4,6 +4,7 @@ use super::passes::{self, Coordinates};
 use super::sensor::{self, Sensor};
 use super::{CloudParameters, Revolution};
 use crate::ego::wrapped_rad;
+use crate::float::LANES;
 use crate::time::Time;
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -13,6 +14,8 @@ use std::ops::Range;
 pub const MAX_COLUMNS: usize = 2000;
 /// Layers of a column.
 pub const MAX_LAYERS: usize = 16;
+/// Where a column is computed in halves, each is as much as a register holds.
+const _: () = assert!(MAX_LAYERS == 2 * LANES);
 /// Points that the array holds.
 pub const CAPACITY: usize = MAX_COLUMNS * MAX_LAYERS;
 

@@ -269,12 +269,13 @@ impl Placer {
         for part in &self.part_of {
             self.parts[*part as usize].place += 1;
         }
-        self.parts[NO_PART as usize].place = 0;
         let mut next = self.placed.len();
-        for part in &mut self.parts {
+        for part in &mut self.parts[1..] {
             next += std::mem::replace(&mut part.place, next);
         }
-        self.placed.resize(next, Placed::default());
+        // What belongs to none goes behind all others, again and again to the same place.
+        self.parts[NO_PART as usize].place = next;
+        self.placed.resize(next + 1, Placed::default());
     }
 
     /// Gives what is above the cut, and goes on from the return below, the part of that.
@@ -294,16 +295,12 @@ impl Placer {
 
     /// Puts the returns of every part side by side, and makes the parts patches.
     fn sort(&mut self, is_too_tall: bool) {
-        // What belongs to none goes behind all others, again and again to the same place.
-        let end = self.placed.len();
-        self.placed.push(Placed::default());
-        self.parts[NO_PART as usize].place = end;
         for (placed, part) in self.cluster.iter().zip(&self.part_of) {
             let place = &mut self.parts[*part as usize].place;
             self.placed[*place] = placed;
             *place += usize::from(*part != NO_PART);
         }
-        self.placed.truncate(end);
+        self.placed.pop();
         // Each part now ends where the next one begins.
         for part in &self.parts[1..] {
             let begin = self.patches.last().map_or(0, |patch| patch.end);
