@@ -119,6 +119,8 @@ fn each_column_has_the_pose_of_its_own_time() {
         let [x, ..] = sweep.pose(share).position_m;
         assert!((x - east_m).abs() < 5e-3, "{share}: {x}");
     }
+    let [east_mps, north_mps] = sweep.velocity_mps(0.1);
+    assert!((east_mps - 10.0).abs() < 0.1 && north_mps.abs() < 0.1);
 }
 
 #[test]

@@ -60,6 +60,12 @@ impl Sweep {
         self.knots[0].toward(&self.sensor, 2.0)
     }
 
+    /// The sensor's mean velocity over the ground in a sweep that took so long.
+    pub fn velocity_mps(&self, duration_s: f64) -> [f64; 2] {
+        let [begin_m, end_m] = [&self.knots[0], &self.sensor].map(|pose| pose.position_m);
+        [0, 1].map(|axis| (end_m[axis] - begin_m[axis]) / duration_s)
+    }
+
     /// The sensor's pose at a share of the sweep, 0 its begin and 1 its end.
     pub fn pose(&self, share: f64) -> Pose {
         let position = (share * (KNOTS - 1) as f64).clamp(0.0, (KNOTS - 1) as f64);

@@ -255,6 +255,7 @@ impl Grouping {
     /// Forms groups of stretches that have the same number, and looks at those that are new.
     fn put_together(&mut self, tracks: &[Track], scene: &Scene<'_>) {
         let sensor_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
+        let sensor_mps = Vector2::from(scene.sweep.velocity_mps(scene.scan.duration_s()));
         self.groups.clear();
         self.sorted.clear();
         self.stretches
@@ -281,6 +282,7 @@ impl Grouping {
                 ] => self.former[*place].look,
                 _ => Look {
                     is_one_of_several,
+                    sensor_mps,
                     ..Look::at(spots, scene.scan, sensor_m)
                 },
             };

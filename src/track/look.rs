@@ -39,6 +39,8 @@ pub(super) struct Look {
     pub(super) is_one_of_several: bool,
     /// Where the sensor is at the end.
     pub(super) sensor_m: Vector2<f64>,
+    /// How it moved.
+    pub(super) sensor_mps: Vector2<f64>,
 }
 
 /// What begins higher has lost its wheels and bumpers to the ground, or between two layers.
@@ -96,6 +98,7 @@ impl Look {
             is_cut: cuts(spots, ends, scan),
             is_one_of_several: false,
             sensor_m,
+            sensor_mps: Vector2::zeros(),
         }
     }
 

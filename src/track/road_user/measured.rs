@@ -61,6 +61,7 @@ impl Track {
             *known_m += gain * (fresh_m - *known_m);
         }
         self.note_motion(look);
+        self.is_carried = self.goes_like_a_rail(look, spots);
         if self.parted.is_renewed_by(look.points, seen_at) {
             self.parted = Parting::of(&self.motion.estimate(), look.points, seen_at);
         }
@@ -146,6 +147,32 @@ impl Track {
         }
     }
 
+    /// Whether it goes with the sensor as what is met of a rail does: a layer meets it at one
+    /// distance, wherever the sensor is.
+    fn goes_like_a_rail(&self, look: &Look, spots: &[Spot]) -> bool {
+        /// A slower sensor carries nothing.
+        const SLOWEST_MPS: f64 = 2.0;
+        /// Part of the sensor's velocity by which that of a piece may be off: from layer to layer it
+        /// falls back.
+        const OFF: f64 = 0.7;
+        /// A rail or a fence is lower than road users, and thinner than what of them is so long.
+        const HIGHEST_M: f64 = 1.25;
+        const SHORTEST_M: f64 = 0.8;
+        const WIDEST_M: f64 = 0.4;
+        let velocity_mps = self.velocity_mps();
+        let sensor_speed_mps = look.sensor_mps.norm();
+        if sensor_speed_mps < SLOWEST_MPS
+            || (velocity_mps - look.sensor_mps).norm() > OFF * sensor_speed_mps
+            || self.shape.top_m > HIGHEST_M
+            || self.shape.seen_m[0].max(self.shape.seen_m[1]) < SHORTEST_M
+        {
+            return false;
+        }
+        let course_rad = libm::atan2(velocity_mps.y, velocity_mps.x);
+        let [_, across_m] = View::of(look, spots, course_rad).extent_m();
+        across_m < WIDEST_M
+    }
+
     pub(super) fn qualities(&self) -> Qualities {
         let [length_m, width_m] = self.shape.seen_m;
         Qualities {
@@ -159,7 +186,7 @@ impl Track {
             roughness_m: self.roughness_m,
             speed_mps: self.speed_mps,
             // The end of what is seen of a wall moves, too, but not by its length.
-            moved: self.moves && self.travelled_m > (2.0 * length_m).max(1.2),
+            moved: self.moves && !self.is_carried && self.travelled_m > (2.0 * length_m).max(1.2),
             whole_m: (self.shape.whole[0] > 0.3).then_some(length_m),
             wide_m: (self.shape.whole[1] > 0.5).then_some(width_m),
             range_m: self.range_m,
@@ -224,6 +251,39 @@ mod tests {
         }
         let wide_m = track.qualities().wide_m;
         assert!(wide_m.is_some_and(|wide_m| wide_m < 0.25), "{wide_m:?}");
+    }
+
+    #[test]
+    fn what_goes_with_the_sensor_like_a_rail_is_none_however_far_it_goes() {
+        // 3 m of a single layer, 10 m to the side of a sensor that passes at 20 m/s.
+        let scan = scan_of(1800, |column, layer| match column {
+            400..500 if layer == 4 && column % 8 == 0 => {
+                (1000.0 / (0.2 * column as f64).to_radians().sin()) as u16
+            }
+            _ => 0,
+        });
+        let spots = spots_of(&scan);
+        let velocity_mps = Vector2::new(0.0, 20.0);
+        let after_a_second = |sensor_mps| {
+            let look = |seconds| Look {
+                sensor_mps,
+                ..Look::at(&spots, &scan, seconds * velocity_mps)
+            };
+            let (mut outline, begin) = (vec![], scan.time());
+            let mut track = Track::new(0, false, &spots, &look(0.0), begin, 0.0, &mut outline);
+            for tenth in 1..=10 {
+                let seconds = 0.1 * f64::from(tenth);
+                let end = begin + Span::from_seconds(seconds);
+                track.measure(&spots, &look(seconds), end, 0.0, &mut outline);
+            }
+            assert!(track.moves && (track.velocity_mps() - velocity_mps).norm() < 1.0);
+            track.qualities().moved
+        };
+        assert!(!after_a_second(velocity_mps));
+        assert!(!after_a_second(1.5 * velocity_mps));
+        for other in [Vector2::zeros(), -velocity_mps, 5.0 * velocity_mps] {
+            assert!(after_a_second(other));
+        }
     }
 
     #[test]

@@ -74,6 +74,8 @@ pub(super) struct Track {
     /// Whether it was seen to move, and how far.
     moves: bool,
     travelled_m: f64,
+    /// Whether its motion may be the sensor's.
+    is_carried: bool,
     is_suspect: bool,
     /// Where it was first seen, since its frame is the same.
     born_m: Vector2<f64>,
@@ -120,6 +122,7 @@ impl Track {
             speed_mps: 0.0,
             moves: false,
             travelled_m: 0.0,
+            is_carried: false,
             is_suspect,
             born_m: look.middle_m,
             trails: Trails::default(),
