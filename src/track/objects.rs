@@ -215,7 +215,9 @@ impl ObjectTracker {
     ) {
         self.take_places(origin_m, |_| 0.0);
         for (number, group) in self.grouping.groups().iter().enumerate() {
-            if group.claimed_by.is_some() || self.assigner.is_paired(number) {
+            // What was found in the place of a track that it cannot be may be a piece of that.
+            let is_claimed = |owner: usize| !self.tracks[owner].is_dwarfed_by(&group.look);
+            if self.assigner.is_paired(number) || group.claimed_by.is_some_and(is_claimed) {
                 continue;
             }
             let middle_m = group.look.middle_m;
@@ -488,6 +490,26 @@ mod tests {
             see(&mut tracker, &later(&scan, 0.1 * revolution as f64));
         }
         assert!(tracker.next_id <= 2, "{}", tracker.next_id);
+    }
+
+    #[test]
+    fn what_is_large_is_no_piece_of_the_small_things_before_it() {
+        let mut tracker = ObjectTracker::default();
+        let scan = |is_met: fn(usize) -> bool| {
+            scan_of(1800, |column, layer| {
+                u16::from(is_met(column) && (3..9).contains(&layer)) * 1500
+            })
+        };
+        // Two posts 15 m away, and then the side of a lorry of 8 m.
+        let posts = scan(|column| matches!(column, 100..104 | 130..134));
+        let side = scan(|column| (100..253).contains(&column));
+        for revolution in 0..6 {
+            let seen = if revolution < 3 { &posts } else { &side };
+            see(&mut tracker, &later(seen, 0.1 * f64::from(revolution)));
+        }
+        let longest_m = |longest_m: f64, track: &Track| longest_m.max(track.rectangle().length_m);
+        let longest_m = tracker.tracks.iter().fold(0.0, longest_m);
+        assert!(longest_m > 7.0, "{longest_m}");
     }
 
     #[test]

@@ -241,6 +241,14 @@ impl Track {
         self.points < SPARSE
     }
 
+    /// Whether a group shows so much more than it ever did that it is no piece of that.
+    pub(super) fn is_dwarfed_by(&self, look: &Look) -> bool {
+        const TIMES: f64 = 4.0;
+        /// Of a few returns there may be many more in the next revolution.
+        const FEW: f64 = 4.0;
+        look.points as f64 > TIMES * (self.usual_points + FEW)
+    }
+
     pub(super) fn odds(&self) -> f64 {
         self.existence.odds()
     }
