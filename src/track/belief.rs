@@ -90,7 +90,7 @@ struct Profile {
 
 /// In the order of [`ROAD_USERS`]. Lengths and widths: cars from the smallest to vans, and for a
 /// rear that is all one sees; bicycles with their riders (FGSV, RASt 2006: 1.9 m by 0.8 m at
-/// most); people; lorries and buses up to an articulated one.
+/// most); people; lorries and buses up to an articulated one (16.5 m, Directive 96/53/EC).
 const PROFILES: [Profile; 4] = [
     Profile {
         long_m: Within(1.35, 5.3, 0.2),
@@ -132,12 +132,12 @@ const PROFILES: [Profile; 4] = [
         log_prior: -1.6,
     },
     Profile {
-        long_m: Within(5.0, 15.0, 1.1),
+        long_m: Within(5.0, 16.5, 1.1),
         short_m: Within(0.1, 2.8, 0.2),
         whole_m: Within(5.0, 18.0, 0.5),
         wide_m: Within(1.5, 2.8, 0.2),
         across_m: Within(0.1, 2.8, 0.2),
-        upper_m: Within(1.3, 15.0, 0.2),
+        upper_m: Within(1.3, 18.0, 0.2),
         top_m: Within(2.3, 4.0, 0.12),
         speed_mps: Within(0.0, 30.0, 2.0),
         faster_log: WORST_LOG,
@@ -451,6 +451,29 @@ mod tests {
         };
         let [car, rail] = [car, rail].map(|qualities| Belief::of(&qualities).road_user());
         assert!(car > 0.9 && rail < 0.2, "{car} {rail}");
+    }
+
+    #[test]
+    fn an_articulated_lorry_is_as_long_above_as_below() {
+        let lorry = Qualities {
+            long_m: 16.4,
+            short_m: 2.4,
+            wide_m: Some(2.4),
+            upper_m: Some(16.5),
+            top_m: 4.0,
+            top_below_m: 4.1,
+            speed_mps: 22.0,
+            moved: true,
+            points: 9000,
+            ..CAR
+        };
+        let house = Qualities {
+            long_m: 25.0,
+            upper_m: Some(25.0),
+            ..lorry
+        };
+        let [lorry, house] = [lorry, house].map(|qualities| Belief::of(&qualities).road_user());
+        assert!(lorry > 0.9 && house < 0.2, "{lorry} {house}");
     }
 
     #[test]
