@@ -173,6 +173,23 @@ impl Track {
         across_m < WIDEST_M
     }
 
+    /// How far it must have gone until that says that it moves. The end of what is seen of a wall
+    /// moves, too, but not by its length; what shows a lorry's front beside its length is no wall.
+    fn telling_way_m(&self) -> f64 {
+        const SHORTEST_M: f64 = 1.2;
+        const LENGTHS: f64 = 2.0;
+        const LORRY_LENGTHS: f64 = 0.5;
+        const LORRY_M: [f64; 2] = [5.0, 1.5];
+        let seen_m = self.shape.seen_m;
+        let is_large = (0..2).all(|axis| seen_m[axis] > LORRY_M[axis]);
+        let lengths = if is_large && self.shape.is_tall() {
+            LORRY_LENGTHS
+        } else {
+            LENGTHS
+        };
+        (lengths * seen_m[0]).max(SHORTEST_M)
+    }
+
     pub(super) fn qualities(&self) -> Qualities {
         let [length_m, width_m] = self.shape.seen_m;
         Qualities {
@@ -185,8 +202,7 @@ impl Track {
             goes_on: self.goes_on,
             roughness_m: self.roughness_m,
             speed_mps: self.speed_mps,
-            // The end of what is seen of a wall moves, too, but not by its length.
-            moved: self.moves && !self.is_carried && self.travelled_m > (2.0 * length_m).max(1.2),
+            moved: self.moves && !self.is_carried && self.travelled_m > self.telling_way_m(),
             whole_m: (self.shape.whole[0] > 0.3).then_some(length_m),
             wide_m: (self.shape.whole[1] > 0.5).then_some(width_m),
             range_m: self.range_m,
@@ -284,6 +300,21 @@ mod tests {
         for other in [Vector2::zeros(), -velocity_mps, 5.0 * velocity_mps] {
             assert!(after_a_second(other));
         }
+    }
+
+    #[test]
+    fn a_lorry_is_known_to_move_before_it_went_its_length_and_a_wall_is_not() {
+        let mut lorry = seen(0.0);
+        (lorry.shape.seen_m, lorry.shape.top_m) = ([12.0, 2.5], 3.5);
+        lorry.travelled_m = 8.0;
+        let wall = |shape: fn(&mut Track)| {
+            let mut wall = lorry.clone();
+            shape(&mut wall);
+            wall
+        };
+        assert!(lorry.qualities().moved);
+        assert!(!wall(|wall| wall.shape.seen_m[1] = 0.5).qualities().moved);
+        assert!(!wall(|wall| wall.shape.top_m = 1.5).qualities().moved);
     }
 
     #[test]
