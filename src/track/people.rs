@@ -1,5 +1,4 @@
-//! People side by side: a cluster cannot tell their shoulders apart, but shows their heads, if the
-//! same layer meets all of them.
+//! People side by side: a cluster cannot tell their shoulders apart, but shows their heads.
 
 use super::placing::{Bounds, Placed};
 use crate::cloud::Scan;
@@ -39,9 +38,50 @@ impl Head {
     }
 }
 
+/// Heads from left to right, or from right to left.
+#[derive(Debug, Default)]
+struct Heads {
+    heads: [Option<Head>; MOST_PEOPLE],
+    count: usize,
+}
+
+impl Heads {
+    fn iter(&self) -> impl DoubleEndedIterator<Item = &Head> + Clone {
+        self.heads[..self.count].iter().flatten()
+    }
+
+    /// Goes on with the last one in a further return of its layer, or begins another one; whether
+    /// there is room for that.
+    fn go_on(&mut self, column: usize, at_m: [f32; 2]) -> bool {
+        if let Some(head) = self.heads[..self.count].iter_mut().flatten().last()
+            && (distance_m(head.to_m, at_m) < LEAST_GAP_M || column - head.last <= MISSED)
+        {
+            (head.last, head.to_m) = (column, at_m);
+            return true;
+        }
+        self.add(Head {
+            first: column,
+            last: column,
+            from_m: at_m,
+            to_m: at_m,
+        })
+    }
+
+    /// Adds one in its place; whether there is room for it.
+    fn add(&mut self, head: Head) -> bool {
+        if self.count == MOST_PEOPLE {
+            return false;
+        }
+        let place = self.iter().filter(|other| other.first < head.first).count();
+        self.heads[place..=self.count].rotate_right(1);
+        self.heads[place] = Some(head);
+        self.count += 1;
+        true
+    }
+}
+
 /// Where the returns of one person end and those of the next one begin, in a patch that shows
-/// several heads in its topmost layer; nothing in any other. The returns are in the order of the
-/// scan.
+/// several heads; nothing in any other. The returns are in the order of the scan.
 pub(super) fn cuts(placed: &[Placed], bounds: &Bounds, scan: &Scan, cuts: &mut Vec<usize>) {
     cuts.clear();
     let long_m = distance_m(bounds.low_m, bounds.high_m);
@@ -50,53 +90,61 @@ pub(super) fn cuts(placed: &[Placed], bounds: &Bounds, scan: &Scan, cuts: &mut V
     if !may_be_people {
         return;
     }
-    let column_of = |placed: &Placed| scan.column(placed.point as usize);
-    let layer_of = |placed: &Placed| scan.layer(placed.point as usize);
-    let highest = placed.iter().map(layer_of).max().unwrap_or(0);
-    let mut heads = [None::<Head>; MOST_PEOPLE];
-    let mut count = 0;
-    let tops = placed.iter().filter(|placed| layer_of(placed) == highest);
-    for top in tops {
-        let (column, at_m) = (column_of(top), top.at_m);
-        match heads[count.max(1) - 1].as_mut() {
-            Some(head)
-                if distance_m(head.to_m, at_m) < LEAST_GAP_M || column - head.last <= MISSED =>
-            {
-                (head.last, head.to_m) = (column, at_m);
-            }
-            _ if count == MOST_PEOPLE || top.above_m < LOWEST_HEAD_M => return,
-            _ => {
-                heads[count] = Some(Head {
-                    first: column,
-                    last: column,
-                    from_m: at_m,
-                    to_m: at_m,
-                });
-                count += 1;
-            }
-        }
-    }
-    let heads = || heads.iter().flatten();
-    let are_heads = heads().all(|head| distance_m(head.from_m, head.to_m) < WIDEST_HEAD_M);
-    if count < 2 || !are_heads || long_m > ROOM_M * count as f32 + MORE_M {
+    let Some(heads) = heads(placed, scan) else {
+        return;
+    };
+    if heads.count < 2 || long_m > ROOM_M * heads.count as f32 + MORE_M {
         return;
     }
     let is_over_seam =
         |first: &Head, last: &Head| distance_m(last.to_m, first.from_m) < LEAST_GAP_M;
-    if let (Some(first), Some(last)) = (heads().next(), heads().next_back())
+    if let (Some(first), Some(last)) = (heads.iter().next(), heads.iter().next_back())
         && is_over_seam(first, last)
     {
         return;
     }
-    for (one, next) in heads().zip(heads().skip(1)) {
+    for (one, next) in heads.iter().zip(heads.iter().skip(1)) {
         let apart_m = distance_m(one.middle_m(), next.middle_m());
         if !(LEAST_APART_M..MOST_APART_M).contains(&apart_m) {
             cuts.clear();
             return;
         }
         let middle = (one.last + next.first) / 2;
-        cuts.push(placed.partition_point(|placed| column_of(placed) <= middle));
+        cuts.push(placed.partition_point(|placed| scan.column(placed.point as usize) <= middle));
     }
+}
+
+/// The heads in some returns, if there is nothing else so high. People differ in height, so that
+/// each layer may show other ones; what is below a head are shoulders.
+fn heads(placed: &[Placed], scan: &Scan) -> Option<Heads> {
+    let layer_of = |placed: &Placed| scan.layer(placed.point as usize);
+    let highest = placed.iter().map(layer_of).max()?;
+    let mut heads = Heads::default();
+    for layer in (0..=highest).rev() {
+        let mut found = Heads::default();
+        for top in placed.iter().filter(|placed| layer_of(placed) == layer) {
+            if top.above_m < LOWEST_HEAD_M {
+                return Some(heads);
+            }
+            if !found.go_on(scan.column(top.point as usize), top.at_m) {
+                return None;
+            }
+        }
+        for head in found.iter() {
+            let is_shoulder = |other: &Head| {
+                (head.first <= other.last && other.first <= head.last)
+                    || distance_m(head.middle_m(), other.middle_m()) < LEAST_APART_M
+            };
+            if layer < highest && heads.iter().any(is_shoulder) {
+                continue;
+            }
+            let is_head = distance_m(head.from_m, head.to_m) < WIDEST_HEAD_M;
+            if !is_head || !heads.add(*head) {
+                return None;
+            }
+        }
+    }
+    Some(heads)
 }
 
 fn distance_m(from_m: [f32; 2], to_m: [f32; 2]) -> f32 {
@@ -154,6 +202,22 @@ mod tests {
         let third = person(130);
         let found = cuts_of(|column| left(column).or(right(column)).or(third(column)));
         assert_eq!(found, [50, 100]);
+    }
+
+    #[test]
+    fn people_differ_in_height() {
+        let (left, right) = (person(100), person(115));
+        let tall = |column: usize| left(column).map(|top| if top == 7 { 8 } else { top });
+        let found = cuts_of(|column| tall(column).or(right(column)));
+        // Fifteen columns of three layers, and five of two more.
+        assert_eq!(found, [55]);
+        // The shoulders of somebody tall are no heads.
+        let broad = |column: usize| match column.checked_sub(100)? {
+            8..12 => Some(8),
+            ..6 | 14..20 => Some(7),
+            _ => Some(6),
+        };
+        assert!(cuts_of(broad).is_empty());
     }
 
     #[test]
