@@ -193,16 +193,15 @@ impl Grouping {
                 tracks[*track].is_vehicle() || forecasts.is_nearest(*track, patches, number)
             });
         }
-        let (top_m, middle_m) = (f64::from(patch.bounds.top_m), patch.bounds.middle_m());
-        let is_lorry = |track: &usize| {
-            let lorry = &tracks[*track];
-            lorry.is_published
-                && lorry.may_be_lorry(top_m)
-                && forecasts.of(*track).reaches(middle_m)
+        let middle_m = patch.bounds.middle_m();
+        let is_known_vehicle = |track: &usize| {
+            let vehicle = &tracks[*track];
+            vehicle.is_published && vehicle.is_vehicle() && forecasts.of(*track).reaches(middle_m)
         };
-        if self.near.iter().any(is_lorry) {
-            // Pieces of it are no objects.
-            self.near.retain(|track| tracks[*track].is_published);
+        if self.near.iter().any(is_known_vehicle) {
+            // Pieces of it are no vehicles; who stands beside it is somebody.
+            self.near
+                .retain(|track| tracks[*track].is_published || !tracks[*track].is_vehicle());
         }
     }
 

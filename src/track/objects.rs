@@ -513,6 +513,35 @@ mod tests {
     }
 
     #[test]
+    fn what_lies_in_the_place_of_a_known_vehicle_is_no_other_vehicle() {
+        // 4.5 m long, 10 m away.
+        let scan = scan_of(1800, |column, layer| match column {
+            100..230 if (3..8).contains(&layer) => 1000,
+            _ => 0,
+        });
+        let spots = spots_of(&scan);
+        let track = |id: u32, spots: &[Spot]| {
+            let look = Look::at(spots, &scan, Vector2::zeros());
+            Track::new(id, false, spots, &look, scan.time(), 0.0, &mut vec![])
+        };
+        let claimed = |is_known: bool| {
+            let mut whole = track(7, &spots);
+            whole.is_published = is_known;
+            let piece = track(8, &spots[..spots.len() / 2]);
+            assert!(whole.is_vehicle() && piece.is_vehicle());
+            let mut tracker = ObjectTracker {
+                tracks: vec![piece, whole],
+                ..ObjectTracker::default()
+            };
+            see(&mut tracker, &later(&scan, 0.1));
+            let groups = tracker.grouping.groups().iter();
+            groups.map(|group| group.claimed_by).collect::<Vec<_>>()
+        };
+        assert_eq!(claimed(true), [Some(1)]);
+        assert_ne!(claimed(false), [Some(1)]);
+    }
+
+    #[test]
     fn two_people_are_two_once_their_heads_were_seen() {
         let person = |first: usize, top: usize| {
             move |column: usize| match column.checked_sub(first)? {

@@ -265,8 +265,12 @@ impl Track {
     }
 
     /// Whether it and something so high may both be parts of a lorry.
-    pub(super) fn may_be_lorry(&self, top_m: f64) -> bool {
-        self.is_moving_vehicle() && self.shape.is_tall() && is_tall(top_m)
+    fn may_be_lorry(&self, top_m: f64) -> bool {
+        // What is hardly a road user would grow over all that stands around it.
+        self.is_moving_vehicle()
+            && self.belief.road_user() > 0.5
+            && self.shape.is_tall()
+            && is_tall(top_m)
     }
 
     fn centre(&self, view: &View, expected_m: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
