@@ -61,7 +61,8 @@ pub(super) struct Group {
     begin: usize,
     end: usize,
     pub(super) look: Look,
-    /// The track in whose place they were found; a new object may come of none.
+    /// The track in whose place they were found; a new object comes of none, but for what is too
+    /// large for that track.
     pub(super) claimed_by: Option<usize>,
 }
 

@@ -39,7 +39,7 @@ pub(super) struct Look {
     pub(super) is_one_of_several: bool,
     /// Where the sensor is at the end.
     pub(super) sensor_m: Vector2<f64>,
-    /// How it moved.
+    /// Its velocity over the ground, 0 where no pose is known.
     pub(super) sensor_mps: Vector2<f64>,
 }
 

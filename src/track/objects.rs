@@ -524,21 +524,25 @@ mod tests {
             let look = Look::at(spots, &scan, Vector2::zeros());
             Track::new(id, false, spots, &look, scan.time(), 0.0, &mut vec![])
         };
-        let claimed = |is_known: bool| {
+        let claimed = |is_known: bool, piece: &[Spot]| {
             let mut whole = track(7, &spots);
             whole.is_published = is_known;
-            let piece = track(8, &spots[..spots.len() / 2]);
-            assert!(whole.is_vehicle() && piece.is_vehicle());
+            let piece = track(8, piece);
+            let is_vehicle = piece.is_vehicle();
             let mut tracker = ObjectTracker {
                 tracks: vec![piece, whole],
                 ..ObjectTracker::default()
             };
             see(&mut tracker, &later(&scan, 0.1));
             let groups = tracker.grouping.groups().iter();
-            groups.map(|group| group.claimed_by).collect::<Vec<_>>()
+            let claimed = groups.map(|group| group.claimed_by);
+            (is_vehicle, claimed.collect::<Vec<_>>())
         };
-        assert_eq!(claimed(true), [Some(1)]);
-        assert_ne!(claimed(false), [Some(1)]);
+        let (half, end) = (&spots[..spots.len() / 2], &spots[..40]);
+        assert_eq!(claimed(true, half), (true, vec![Some(1)]));
+        assert_eq!(claimed(false, half), (true, vec![Some(0)]));
+        // Who stands before it keeps what is theirs.
+        assert_eq!(claimed(true, end), (false, vec![Some(0), Some(1)]));
     }
 
     #[test]

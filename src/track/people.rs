@@ -50,9 +50,9 @@ impl Heads {
         self.heads[..self.count].iter().flatten()
     }
 
-    /// Goes on with the last one in a further return of its layer, or begins another one; whether
-    /// there is room for that.
-    fn go_on(&mut self, column: usize, at_m: [f32; 2]) -> bool {
+    /// Extends the last one by a further return of its layer, or begins another one; whether there is
+    /// room for that.
+    fn extend(&mut self, column: usize, at_m: [f32; 2]) -> bool {
         if let Some(head) = self.heads[..self.count].iter_mut().flatten().last()
             && (distance_m(head.to_m, at_m) < LEAST_GAP_M || column - head.last <= MISSED)
         {
@@ -114,19 +114,19 @@ pub(super) fn cuts(placed: &[Placed], bounds: &Bounds, scan: &Scan, cuts: &mut V
     }
 }
 
-/// The heads in some returns, if there is nothing else so high. People differ in height, so that
-/// each layer may show other ones; what is below a head are shoulders.
+/// The heads in some returns, if nothing that is higher than shoulders is wider. People differ in
+/// height, so that each layer may show other ones; what is below a head are shoulders.
 fn heads(placed: &[Placed], scan: &Scan) -> Option<Heads> {
     let layer_of = |placed: &Placed| scan.layer(placed.point as usize);
     let highest = placed.iter().map(layer_of).max()?;
     let mut heads = Heads::default();
     for layer in (0..=highest).rev() {
         let mut found = Heads::default();
-        for top in placed.iter().filter(|placed| layer_of(placed) == layer) {
-            if top.above_m < LOWEST_HEAD_M {
+        for spot in placed.iter().filter(|placed| layer_of(placed) == layer) {
+            if spot.above_m < LOWEST_HEAD_M {
                 return Some(heads);
             }
-            if !found.go_on(scan.column(top.point as usize), top.at_m) {
+            if !found.extend(scan.column(spot.point as usize), spot.at_m) {
                 return None;
             }
         }

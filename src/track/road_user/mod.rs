@@ -241,7 +241,7 @@ impl Track {
         self.points < SPARSE
     }
 
-    /// Whether a group shows so much more than it ever did that it is no piece of that.
+    /// Whether a group shows so much more than it did of late that it is no piece of it.
     pub(super) fn is_dwarfed_by(&self, look: &Look) -> bool {
         const TIMES: f64 = 4.0;
         /// Of a few returns there may be many more in the next revolution.
