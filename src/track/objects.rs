@@ -426,10 +426,7 @@ mod tests {
     fn of_two_tracks_in_one_place_the_later_goes_on_under_the_id_of_the_first() {
         let scan = body(1000, 0);
         let spots = spots_of(&scan);
-        let track = |id: u32, spots: &[Spot]| {
-            let look = Look::at(spots, &scan, Vector2::zeros());
-            Track::new(id, false, spots, &look, scan.time(), 0.0, &mut vec![])
-        };
+        let track = |id: u32, spots: &[Spot]| track_of(id, spots, &scan);
         let mut first = track(7, &spots[..spots.len() / 3]);
         first.is_published = true;
         let mut tracker = ObjectTracker {
@@ -520,10 +517,7 @@ mod tests {
             _ => 0,
         });
         let spots = spots_of(&scan);
-        let track = |id: u32, spots: &[Spot]| {
-            let look = Look::at(spots, &scan, Vector2::zeros());
-            Track::new(id, false, spots, &look, scan.time(), 0.0, &mut vec![])
-        };
+        let track = |id: u32, spots: &[Spot]| track_of(id, spots, &scan);
         let claimed = |is_known: bool, piece: &[Spot]| {
             let mut whole = track(7, &spots);
             whole.is_published = is_known;
@@ -574,6 +568,12 @@ mod tests {
             counts.push(tracker.tracks.len());
         }
         assert_eq!((counts[4], counts[9], counts[14]), (1, 2, 2), "{counts:?}");
+    }
+
+    /// A track that was seen once.
+    fn track_of(id: u32, spots: &[Spot], scan: &Scan) -> Track {
+        let look = Look::at(spots, scan, Vector2::zeros());
+        Track::new(id, false, spots, &look, scan.time(), 0.0, &mut vec![])
     }
 
     /// Four layers and ten columns at a range; in some columns the ray above them meets more.

@@ -23,7 +23,7 @@ const MORE_M: f32 = 0.2;
 const MOST_PEOPLE: usize = 4;
 
 /// Neighbouring columns that show a head.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Head {
     first: usize,
     last: usize,
@@ -41,19 +41,19 @@ impl Head {
 /// Heads from left to right, or from right to left.
 #[derive(Debug, Default)]
 struct Heads {
-    heads: [Option<Head>; MOST_PEOPLE],
+    heads: [Head; MOST_PEOPLE],
     count: usize,
 }
 
 impl Heads {
-    fn iter(&self) -> impl DoubleEndedIterator<Item = &Head> + Clone {
-        self.heads[..self.count].iter().flatten()
+    fn all(&self) -> &[Head] {
+        &self.heads[..self.count]
     }
 
     /// Extends the last one by a further return of its layer, or begins another one; whether there is
     /// room for that.
     fn extend(&mut self, column: usize, at_m: [f32; 2]) -> bool {
-        if let Some(head) = self.heads[..self.count].iter_mut().flatten().last()
+        if let Some(head) = self.heads[..self.count].last_mut()
             && (distance_m(head.to_m, at_m) < LEAST_GAP_M || column - head.last <= MISSED)
         {
             (head.last, head.to_m) = (column, at_m);
@@ -72,9 +72,9 @@ impl Heads {
         if self.count == MOST_PEOPLE {
             return false;
         }
-        let place = self.iter().filter(|other| other.first < head.first).count();
-        self.heads[place..=self.count].rotate_right(1);
-        self.heads[place] = Some(head);
+        let place = self.all().partition_point(|other| other.first < head.first);
+        self.heads.copy_within(place..self.count, place + 1);
+        self.heads[place] = head;
         self.count += 1;
         true
     }
@@ -93,17 +93,14 @@ pub(super) fn cuts(placed: &[Placed], bounds: &Bounds, scan: &Scan, cuts: &mut V
     let Some(heads) = heads(placed, scan) else {
         return;
     };
-    if heads.count < 2 || long_m > ROOM_M * heads.count as f32 + MORE_M {
+    let [first, .., last] = heads.all() else {
+        return;
+    };
+    let is_over_seam = distance_m(last.to_m, first.from_m) < LEAST_GAP_M;
+    if is_over_seam || long_m > ROOM_M * heads.count as f32 + MORE_M {
         return;
     }
-    let is_over_seam =
-        |first: &Head, last: &Head| distance_m(last.to_m, first.from_m) < LEAST_GAP_M;
-    if let (Some(first), Some(last)) = (heads.iter().next(), heads.iter().next_back())
-        && is_over_seam(first, last)
-    {
-        return;
-    }
-    for (one, next) in heads.iter().zip(heads.iter().skip(1)) {
+    for (one, next) in heads.all().iter().zip(&heads.all()[1..]) {
         let apart_m = distance_m(one.middle_m(), next.middle_m());
         if !(LEAST_APART_M..MOST_APART_M).contains(&apart_m) {
             cuts.clear();
@@ -130,12 +127,12 @@ fn heads(placed: &[Placed], scan: &Scan) -> Option<Heads> {
                 return None;
             }
         }
-        for head in found.iter() {
+        for head in found.all() {
             let is_shoulder = |other: &Head| {
                 (head.first <= other.last && other.first <= head.last)
                     || distance_m(head.middle_m(), other.middle_m()) < LEAST_APART_M
             };
-            if layer < highest && heads.iter().any(is_shoulder) {
+            if layer < highest && heads.all().iter().any(is_shoulder) {
                 continue;
             }
             let is_head = distance_m(head.from_m, head.to_m) < WIDEST_HEAD_M;
