@@ -4,6 +4,8 @@
 //! like a normal distribution. The intervals are sizes of everyday vehicles and people (sources
 //! at the constants); only the roughness of foliage was read off a recording.
 
+use std::ops::RangeInclusive;
+
 use super::Class;
 
 /// The road users that are told apart, in the order of [`Belief`].
@@ -29,6 +31,8 @@ pub(super) struct Qualities {
     pub(super) across_m: Option<f64>,
     /// Greatest extent of what is higher than a bonnet or a handlebar, if any of it was seen.
     pub(super) upper_m: Option<f64>,
+    /// Extent of what is lower than hips, if enough of it was seen.
+    pub(super) lower_m: Option<f64>,
     /// Top above the ground: at least this...
     pub(super) top_m: f64,
     /// ...and at most this, which is where the next ray passed over it.
@@ -47,6 +51,37 @@ pub(super) struct Qualities {
     pub(super) points: usize,
     /// Whether it was cut off structure.
     pub(super) is_suspect: bool,
+    /// Whether something nearer hides what is beside it.
+    pub(super) is_cut: bool,
+}
+
+impl Qualities {
+    /// What speaks for a person: something upright as high as one, of which there is little else in
+    /// a street. Signs are flat, and stand on a post; what is seen of a hedge or a fence between two
+    /// things that are nearer may have any shape.
+    fn upright_log(&self) -> f64 {
+        const FREE_LOG: f64 = 1.4;
+        const CUT_LOG: f64 = 0.6;
+        /// Fewer returns show no shape.
+        const FEWEST: usize = 6;
+        const HEIGHT_M: RangeInclusive<f64> = 1.3..=1.95;
+        /// What a ray passed over by more than this may be much higher.
+        const PASSED_BELOW_M: f64 = 2.6;
+        const LEAST_SHOULDERS_M: f64 = 0.25;
+        const LEAST_DEPTH_M: f64 = 0.11;
+        const LEAST_LEGS_M: f64 = 0.13;
+        let is_upright = self.points >= FEWEST
+            && HEIGHT_M.contains(&self.top_m)
+            && self.top_below_m < PASSED_BELOW_M
+            && self.long_m > LEAST_SHOULDERS_M
+            && self.short_m > LEAST_DEPTH_M
+            && self.lower_m.is_none_or(|lower_m| lower_m > LEAST_LEGS_M);
+        match (is_upright, self.is_cut) {
+            (true, false) => FREE_LOG,
+            (true, true) => CUT_LOG,
+            (false, _) => 0.0,
+        }
+    }
 }
 
 /// No single quality decides alone.
@@ -225,13 +260,11 @@ impl Belief {
                 0.0
             };
             let ends = ENDS.log(qualities.goes_on);
-            // Posts as high as a person are rarer than posts that are lower or higher.
-            let is_upright = ROAD_USERS[number] == Class::Pedestrian
-                && qualities.points >= MANY_FOR_A_PERSON
-                && profile.top_m.log_between(qualities.top_m, qualities.top_m) == 0.0
-                && qualities.long_m > LEAST_SHOULDERS_M
-                && qualities.top_below_m < profile.top_m.1 + ABOVE_A_PERSON_M;
-            let upright = if is_upright { UPRIGHT_LOG } else { 0.0 };
+            let upright = if ROAD_USERS[number] == Class::Pedestrian {
+                qualities.upright_log()
+            } else {
+                0.0
+            };
             let surface = if is_thin { 0.25 * smooth } else { smooth };
             // A wall is flat, a vehicle has bumpers, wheels and screens that do not line up, unless
             // it is a van from behind; walls do not move.
@@ -352,12 +385,6 @@ fn known(within: &Within, value: Option<f64>) -> f64 {
 const FLAT_M: Within = Within(0.25, 3.0, 0.07);
 const DEEP_M: Within = Within(0.6, 3.0, 0.13);
 const MANY: usize = 60;
-/// What speaks for a person where the height is one's, the returns that show it, how wide
-/// shoulders are at least, and how far above a person a ray may pass that shows the height.
-const UPRIGHT_LOG: f64 = 0.6;
-const MANY_FOR_A_PERSON: usize = 10;
-const LEAST_SHOULDERS_M: f64 = 0.35;
-const ABOVE_A_PERSON_M: f64 = 0.65;
 /// Of a road user that reaches out of the sensor's view.
 const ENDLESS_LOG: f64 = -1.5;
 /// Greatest width and depth of people who walk side by side, and how much rarer they are.
@@ -378,6 +405,7 @@ mod tests {
         wide_m: None,
         across_m: None,
         upper_m: Some(1.4),
+        lower_m: None,
         top_m: 1.4,
         top_below_m: 1.7,
         goes_on: 0.0,
@@ -387,6 +415,7 @@ mod tests {
         range_m: 15.0,
         points: 60,
         is_suspect: false,
+        is_cut: false,
     };
 
     #[test]
@@ -540,12 +569,13 @@ mod tests {
     }
 
     #[test]
-    fn who_stands_is_told_from_a_post_by_the_shoulders() {
+    fn who_stands_is_told_from_a_post_by_the_shoulders_and_from_a_sign_by_depth_and_legs() {
         let somebody = Qualities {
             long_m: 0.49,
             short_m: 0.18,
             whole_m: Some(0.49),
             upper_m: Some(0.55),
+            lower_m: Some(0.3),
             top_m: 1.71,
             top_below_m: 2.22,
             roughness_m: 0.03,
@@ -558,8 +588,44 @@ mod tests {
             upper_m: Some(0.2),
             ..somebody
         };
-        let [somebody, post] = [somebody, post].map(|qualities| Belief::of(&qualities).road_user());
-        assert!(somebody > 0.5 && post < 0.5, "{somebody} {post}");
+        let sign = Qualities {
+            lower_m: Some(0.08),
+            ..somebody
+        };
+        let flat = Qualities {
+            short_m: 0.07,
+            lower_m: None,
+            ..somebody
+        };
+        let high = Qualities {
+            top_m: 1.96,
+            ..somebody
+        };
+        for qualities in [post, sign, flat, high] {
+            let belief = Belief::of(&qualities);
+            assert!(belief.road_user() < 0.5, "{qualities:?} {belief:?}");
+        }
+        // Seen from the side, by a few rays, and between two things that are nearer.
+        let few = Qualities {
+            long_m: 0.34,
+            whole_m: Some(0.34),
+            points: 9,
+            ..somebody
+        };
+        let between = Qualities {
+            is_cut: true,
+            ..somebody
+        };
+        for qualities in [somebody, few, between] {
+            let belief = Belief::of(&qualities);
+            assert_eq!(belief.class().0, Class::Pedestrian, "{belief:?}");
+            assert!(belief.road_user() > 0.5, "{qualities:?} {belief:?}");
+        }
+        let narrow = |is_cut| {
+            let qualities = Qualities { is_cut, ..few };
+            Belief::of(&qualities).road_user()
+        };
+        assert!(narrow(true) < narrow(false));
     }
 
     #[test]

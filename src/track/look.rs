@@ -20,6 +20,8 @@ pub(super) struct Look {
     pub(super) top_below_m: f64,
     /// Greatest extent of what is higher than a bonnet or a handlebar, if there is any of it.
     pub(super) upper_m: Option<f64>,
+    /// Greatest extent of what is lower than hips, if enough of it is met.
+    pub(super) lower_m: Option<f64>,
     /// Median jump of the range between neighbouring returns of a layer.
     pub(super) roughness_m: f64,
     /// Share of its columns in which it goes on above.
@@ -47,6 +49,12 @@ pub(super) struct Look {
 const BELT_M: f32 = 0.55;
 /// Share of returns below it that shows a body.
 const LOW_SHARE: f64 = 0.15;
+/// Bonnets and handlebars are lower, and a few returns show something above them.
+const UPPER_M: f32 = 1.1;
+const FEWEST_UPPER: usize = 2;
+/// Hips and the lower edges of signs are higher; of legs, two returns may be one.
+const LOWER_M: f32 = 0.8;
+const FEWEST_LOWER: usize = 3;
 /// A nearer return by this much beside an object hides a part of it.
 const OCCLUDER_M: f64 = 0.7;
 /// Columns beside an object that are looked at.
@@ -88,7 +96,8 @@ impl Look {
             floor_m: f64::from(floor_m),
             top_m,
             top_below_m,
-            upper_m: upper_m(spots),
+            upper_m: extent_m(spots, |above_m| above_m > UPPER_M, FEWEST_UPPER),
+            lower_m: extent_m(spots, |above_m| above_m < LOWER_M, FEWEST_LOWER),
             roughness_m: roughness_m(spots, scan),
             goes_on: goes_on(spots, scan),
             range_m,
@@ -209,12 +218,11 @@ fn cuts(spots: &[Spot], ends: [&Spot; 2], scan: &Scan) -> [bool; 2] {
     })
 }
 
-/// Diagonal of the returns above the height of bonnets and handlebars.
-fn upper_m(spots: &[Spot]) -> Option<f64> {
-    const UPPER_M: f32 = 1.1;
-    let upper = spots.iter().filter(|spot| spot.above_m > UPPER_M);
-    (upper.clone().count() >= 2).then(|| {
-        let [low_m, high_m] = bounds_m(upper);
+/// Diagonal of the returns at some heights, if they are not too few.
+fn extent_m(spots: &[Spot], is_there: impl Fn(f32) -> bool, fewest: usize) -> Option<f64> {
+    let there = spots.iter().filter(|spot| is_there(spot.above_m));
+    (there.clone().count() >= fewest).then(|| {
+        let [low_m, high_m] = bounds_m(there);
         let [along_m, across_m] = [0, 1].map(|axis| f64::from(high_m[axis] - low_m[axis]));
         libm::hypot(along_m, across_m)
     })
@@ -261,6 +269,23 @@ mod tests {
     use super::*;
     use crate::cloud::tests::scan_of;
     use crate::track::tests::spots_of;
+
+    #[test]
+    fn what_is_low_is_as_wide_as_it_is_met_unless_too_little_is() {
+        // 10 m away layer 5 passes 1.04 m above the ground, and 4 and 3 0.69 and 0.34 m.
+        let lower_m = |columns: usize| {
+            let scan = scan_of(1800, |column, layer| match layer {
+                3..5 if (100..100 + columns).contains(&column) => 1000,
+                5..7 if (90..120).contains(&column) => 1000,
+                _ => 0,
+            });
+            let spots = spots_of(&scan);
+            Look::at(&spots, &scan, Vector2::zeros()).lower_m
+        };
+        let of_legs = lower_m(8).unwrap_or_default();
+        assert!((of_legs - 0.28).abs() < 0.02, "{of_legs}");
+        assert_eq!(lower_m(1), None);
+    }
 
     #[test]
     fn the_ends_of_a_group_are_its_outermost_columns_in_whatever_order_it_comes() {

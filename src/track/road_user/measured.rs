@@ -47,6 +47,7 @@ impl Track {
         self.existence.see();
         self.last_measured = seen_at;
         self.is_hidden = false;
+        self.is_cut = look.is_cut != [false; 2];
         self.points = look.points;
         self.usual_points += 0.2 * (look.points as f64 - self.usual_points);
         self.range_m = look.range_m;
@@ -59,6 +60,10 @@ impl Track {
             let known_m = self.upper_m.get_or_insert(fresh_m);
             let gain = if fresh_m > *known_m { 0.3 } else { 0.05 };
             *known_m += gain * (fresh_m - *known_m);
+        }
+        if let Some(fresh_m) = look.lower_m {
+            let known_m = self.lower_m.get_or_insert(fresh_m);
+            *known_m += 0.2 * (fresh_m - *known_m);
         }
         self.note_motion(look);
         self.is_carried = self.goes_like_a_rail(look, spots);
@@ -197,6 +202,7 @@ impl Track {
             short_m: length_m.min(width_m),
             across_m: self.shape.front_known.then_some(width_m),
             upper_m: self.upper_m,
+            lower_m: self.lower_m,
             top_m: self.shape.top_m,
             top_below_m: self.shape.top_below_m,
             goes_on: self.goes_on,
@@ -208,6 +214,7 @@ impl Track {
             range_m: self.range_m,
             points: self.points,
             is_suspect: self.is_suspect,
+            is_cut: self.is_cut,
         }
     }
 }

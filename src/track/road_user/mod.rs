@@ -70,6 +70,7 @@ pub(super) struct Track {
     roughness_m: f64,
     goes_on: f64,
     upper_m: Option<f64>,
+    lower_m: Option<f64>,
     speed_mps: f64,
     /// Whether it was seen to move, and how far.
     moves: bool,
@@ -77,6 +78,8 @@ pub(super) struct Track {
     /// Whether its motion may be the sensor's.
     is_carried: bool,
     is_suspect: bool,
+    /// Whether something nearer hides what is beside it.
+    is_cut: bool,
     /// Where it was first seen, since its frame is the same.
     born_m: Vector2<f64>,
     trails: Trails,
@@ -119,11 +122,13 @@ impl Track {
             roughness_m: look.roughness_m,
             goes_on: look.goes_on,
             upper_m: look.upper_m,
+            lower_m: look.lower_m,
             speed_mps: 0.0,
             moves: false,
             travelled_m: 0.0,
             is_carried: false,
             is_suspect,
+            is_cut: look.is_cut != [false; 2],
             born_m: look.middle_m,
             trails: Trails::default(),
             existence: Existence::new(),
