@@ -61,6 +61,12 @@ impl Claims {
         self.owners().flatten().min()
     }
 
+    /// The share of the returns that a track has.
+    pub(super) fn share(&self, track: usize) -> f64 {
+        let own = self.owners().filter(|owner| *owner == Some(track));
+        own.count() as f64 / self.owners.len() as f64
+    }
+
     /// The only track that has any of the returns, and the share of them that it has.
     pub(super) fn only(&self) -> Option<(usize, f64)> {
         let mut owners = self.owners().flatten();
@@ -146,11 +152,15 @@ mod tests {
     }
 
     #[test]
-    fn the_only_owner_is_known_with_its_share() {
+    fn the_only_owner_is_known_with_its_share_and_what_each_of_several_has() {
         assert_eq!(
             owners(&[-5.0, 0.0, 0.5, 1.0].map(at), true).1,
             Some((0, 0.75))
         );
+        let mut claims = Claims::default();
+        let placed = [0.0, 0.5, 4.0, 8.0].map(at);
+        claims.settle(&placed, &[0, 1], &forecasts(), true);
+        assert_eq!([0, 1, 2].map(|track| claims.share(track)), [0.5, 0.25, 0.0]);
         assert_eq!(owners(&[-5.0].map(at), true).1, None);
     }
 }

@@ -540,6 +540,32 @@ mod tests {
     }
 
     #[test]
+    fn what_was_taken_for_one_gives_way_to_two_cars_side_by_side() {
+        // Two fronts 1.8 m wide and 8 m away, 1 m from each other, and 2.7 m of a side of each.
+        let cars = |is_between_seen: bool| {
+            scan_of(1800, |column, layer| match column {
+                _ if !(3..7).contains(&layer) => 0,
+                88..100 => 800 + 23 * (100 - column as u16),
+                164..200 if !is_between_seen => 0,
+                100..264 => 800,
+                264..276 => 800 + 23 * (column as u16 - 263),
+                _ => 0,
+            })
+        };
+        let mut tracker = ObjectTracker::default();
+        let mut ids = vec![];
+        for revolution in 0..20 {
+            let scan = cars(revolution < 10);
+            see(&mut tracker, &later(&scan, 0.1 * f64::from(revolution)));
+            ids.push(tracker.tracks.iter().map(|track| track.id).collect());
+        }
+        let [of_one, .., of_both]: &[Vec<u32>] = &ids[..] else {
+            panic!("{ids:?}");
+        };
+        assert_eq!((&of_one[..], &of_both[..]), (&[0][..], &[1, 2][..]));
+    }
+
+    #[test]
     fn two_people_are_two_once_their_heads_were_seen() {
         let person = |first: usize, top: usize| {
             move |column: usize| match column.checked_sub(first)? {

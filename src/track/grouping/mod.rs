@@ -150,14 +150,15 @@ impl Grouping {
                 .then(|| self.owner(&patch, tracks, scene.scan.time()))
                 .flatten();
             let owns = owner.map(|(track, _)| track);
+            if is_whole {
+                self.count_things(&patch, owns, tracks);
+            }
             let rests = |track: usize| self.forecasts.of(track).rests;
             if owns.is_some_and(rests) {
                 continue;
             }
-            if let Some(track) = owns.filter(|_| patch.diagonal_m() > LARGE_M) {
-                self.large_patches[track] += 1;
-            }
-            for (placed, track) in placed.iter().zip(self.claims.owners()) {
+            let placed = self.placer.placed(&patch).iter();
+            for (placed, track) in placed.zip(self.claims.owners()) {
                 let group = track.map(|track| track as u32).or(is_whole.then_some(own));
                 if let Some(group) = group.filter(|_| !track.is_some_and(rests)) {
                     let mut spot = Spot::new(scene, placed.point, placed.at_m, group);
@@ -203,6 +204,20 @@ impl Grouping {
             // Pieces of it are no vehicles; who stands beside it is somebody.
             self.near
                 .retain(|track| tracks[*track].is_published || !tracks[*track].is_vehicle());
+        }
+    }
+
+    /// Counts a large patch for the track to which it belongs. What is wider than a car may be
+    /// several, so that it need not have all of each of them.
+    fn count_things(&mut self, patch: &Patch, owner: Option<usize>, tracks: &[Track]) {
+        if patch.diagonal_m() <= LARGE_M {
+            return;
+        }
+        for track in &self.near {
+            let has_much = || self.claims.share(*track) > LEAST_CLAIM;
+            if owner == Some(*track) || (tracks[*track].is_wide() && has_much()) {
+                self.large_patches[*track] += 1;
+            }
         }
     }
 

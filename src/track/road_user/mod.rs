@@ -317,10 +317,18 @@ impl Track {
             + 0.3 * vanished
     }
 
+    /// Whether it was seen wider than a car: it may be two of them that stand side by side.
+    pub(super) fn is_wide(&self) -> bool {
+        const WIDE_M: f64 = 2.0;
+        self.shape.seen_m[1] > WIDE_M
+    }
+
     /// There are several things in its place that do not touch: if it is no road user, each of them
-    /// may be one.
+    /// may be one. Of what is wide less doubt is enough.
     pub(super) fn give_way(&mut self) {
-        if self.belief.road_user() < SURELY_NONE && !self.moves && self.is_confirmed() {
+        const HARDLY: f64 = 0.25;
+        let least = if self.is_wide() { HARDLY } else { SURELY_NONE };
+        if self.belief.road_user() < least && !self.moves && self.is_confirmed() {
             self.existence.deny();
         }
     }
