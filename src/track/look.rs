@@ -20,7 +20,8 @@ pub(super) struct Look {
     pub(super) top_below_m: f64,
     /// Greatest extent of what is higher than a bonnet or a handlebar, if there is any of it.
     pub(super) upper_m: Option<f64>,
-    /// Greatest extent of what is lower than hips, if enough of it is met.
+    /// The same of what is lower than hips, if enough of it is met, below what is as narrow as a
+    /// person.
     pub(super) lower_m: Option<f64>,
     /// Median jump of the range between neighbouring returns of a layer.
     pub(super) roughness_m: f64,
@@ -52,8 +53,10 @@ const LOW_SHARE: f64 = 0.15;
 /// Bonnets and handlebars are lower, and a few returns show something above them.
 const UPPER_M: f32 = 1.1;
 const FEWEST_UPPER: usize = 2;
-/// Hips and the lower edges of signs are higher; of legs, two returns may be one.
+/// Hips and the lower edges of signs are higher; of legs, two returns may be one. Shoulders are
+/// narrower.
 const LOWER_M: f32 = 0.8;
+const SHOULDERS_M: f64 = 1.0;
 const FEWEST_LOWER: usize = 3;
 /// A nearer return by this much beside an object hides a part of it.
 const OCCLUDER_M: f64 = 0.7;
@@ -87,6 +90,7 @@ impl Look {
         } else {
             f64::MAX
         };
+        let upper_m = extent_m(spots, |above_m| above_m > UPPER_M, FEWEST_UPPER);
         let ends = ends(spots, scan);
         let ends_m = ends.map(|end| sensor_m + Vector2::from(end.at_m).map(f64::from));
         Self {
@@ -96,8 +100,10 @@ impl Look {
             floor_m: f64::from(floor_m),
             top_m,
             top_below_m,
-            upper_m: extent_m(spots, |above_m| above_m > UPPER_M, FEWEST_UPPER),
-            lower_m: extent_m(spots, |above_m| above_m < LOWER_M, FEWEST_LOWER),
+            upper_m,
+            lower_m: upper_m
+                .filter(|upper_m| *upper_m < SHOULDERS_M)
+                .and_then(|_| extent_m(spots, |above_m| above_m < LOWER_M, FEWEST_LOWER)),
             roughness_m: roughness_m(spots, scan),
             goes_on: goes_on(spots, scan),
             range_m,
@@ -271,20 +277,20 @@ mod tests {
     use crate::track::tests::spots_of;
 
     #[test]
-    fn what_is_low_is_as_wide_as_it_is_met_unless_too_little_is() {
+    fn legs_are_as_wide_as_they_are_met_below_shoulders_unless_too_little_of_them_is() {
         // 10 m away layer 5 passes 1.04 m above the ground, and 4 and 3 0.69 and 0.34 m.
-        let lower_m = |columns: usize| {
+        let lower_m = |columns: usize, shoulders: usize| {
             let scan = scan_of(1800, |column, layer| match layer {
                 3..5 if (100..100 + columns).contains(&column) => 1000,
-                5..7 if (90..120).contains(&column) => 1000,
+                5..7 if (95..95 + shoulders).contains(&column) => 1000,
                 _ => 0,
             });
             let spots = spots_of(&scan);
             Look::at(&spots, &scan, Vector2::zeros()).lower_m
         };
-        let of_legs = lower_m(8).unwrap_or_default();
+        let of_legs = lower_m(8, 16).unwrap_or_default();
         assert!((of_legs - 0.28).abs() < 0.02, "{of_legs}");
-        assert_eq!(lower_m(1), None);
+        assert_eq!((lower_m(1, 16), lower_m(8, 40)), (None, None));
     }
 
     #[test]
