@@ -91,14 +91,6 @@ pub(crate) fn rounded(value: f32) -> u16 {
     (value + ONES).to_bits() as u16
 }
 
-/// The same of a number from -2^15 to 2^15.
-#[inline(always)]
-pub(crate) fn rounded_signed(value: f32) -> i16 {
-    // In the middle between the two, so that what is negative does not fall out of there.
-    const ONES: f32 = (3u32 << 22) as f32;
-    (value + ONES).to_bits() as i16
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

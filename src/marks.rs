@@ -27,11 +27,11 @@ pub(crate) fn count(marks: &[bool]) -> usize {
 
 /// The bits that are set, from the lowest on.
 #[inline(always)]
-pub(crate) fn set_bits(mut bits: u16) -> impl Iterator<Item = usize> {
+pub(crate) fn set_bits(mut bits: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let bit = bits.trailing_zeros();
         bits &= bits.wrapping_sub(1);
-        (bit < u16::BITS).then_some(bit as usize)
+        (bit < u32::BITS).then_some(bit as usize)
     })
 }
 

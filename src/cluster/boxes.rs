@@ -5,8 +5,8 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use super::ClusterParameters;
-use crate::float::{greatest, least};
-use crate::marks::marked;
+use super::rows::NOT_TAKEN;
+use crate::float::{LANES, greatest, least};
 
 /// A box around points, in space and in range.
 #[derive(Debug, Clone, Copy)]
@@ -74,82 +74,129 @@ impl Bounds {
     }
 }
 
-/// Many boxes, by their numbers.
+/// Many boxes, by their numbers, and behind them as many as one register holds to which nothing is
+/// near.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Boxes {
     low_m: [Vec<f32>; SPACE],
     high_m: [Vec<f32>; SPACE],
     eps_squared: Vec<f32>,
-    marks: Vec<bool>,
 }
 
 impl Boxes {
     /// Takes boxes over in the place of those it had.
     pub(super) fn set<'a>(
         &mut self,
-        boxes: impl Iterator<Item = &'a Bounds> + Clone,
+        boxes: impl ExactSizeIterator<Item = &'a Bounds>,
         parameters: &ClusterParameters,
     ) {
-        for axis in 0..SPACE {
-            self.low_m[axis].clear();
-            self.low_m[axis].extend(boxes.clone().map(|bounds| bounds.low_m[axis]));
-            self.high_m[axis].clear();
-            self.high_m[axis].extend(boxes.clone().map(|bounds| bounds.high_m[axis]));
+        let count = boxes.len();
+        for metres in self.low_m.iter_mut().chain(&mut self.high_m) {
+            metres.resize(count + LANES, 0.0);
         }
-        let eps_m = boxes.map(|bounds| bounds.eps_m(parameters));
-        self.eps_squared.clear();
-        self.eps_squared.extend(eps_m.map(|eps_m| eps_m * eps_m));
-        self.marks.resize(self.eps_squared.len(), false);
-    }
-
-    /// The number behind the last box that begins so early along x that it can be near another
-    /// one. All begin in order.
-    pub(super) fn end_of_near(&self, bounds: &Bounds, parameters: &ClusterParameters) -> usize {
-        let last_m = bounds.high_m[0] + bounds.eps_m(parameters);
-        self.low_m[0].partition_point(|x| *x <= last_m)
+        self.eps_squared.resize(count + LANES, 0.0);
+        self.eps_squared[count..].fill(NOT_TAKEN);
+        for (number, bounds) in boxes.enumerate() {
+            for axis in 0..SPACE {
+                self.low_m[axis][number] = bounds.low_m[axis];
+                self.high_m[axis][number] = bounds.high_m[axis];
+            }
+            let eps_m = bounds.eps_m(parameters);
+            self.eps_squared[number] = eps_m * eps_m;
+        }
     }
 
     /// Which of some boxes are so near to another one that points of both may be neighbours.
-    pub(super) fn near(
-        &mut self,
+    pub(super) fn near<'a>(
+        &'a self,
         which: Range<usize>,
-        bounds: &Bounds,
+        bounds: &'a Bounds,
         parameters: &ClusterParameters,
-    ) -> impl Iterator<Item = usize> + use<'_> {
-        let first = which.start;
-        let marks = &mut self.marks[which.clone()];
-        mark_near(
-            (bounds, bounds.eps_m(parameters)),
-            self.low_m.each_ref().map(|low_m| &low_m[which.clone()]),
-            self.high_m.each_ref().map(|high_m| &high_m[which.clone()]),
-            &self.eps_squared[which.clone()],
-            marks,
-        );
-        marked(marks).map(move |place| first + place)
+    ) -> impl Iterator<Item = usize> + use<'a> {
+        self.find_near(which, bounds, parameters, f32::INFINITY)
+    }
+
+    /// The same of boxes that begin in order along x, from one on.
+    pub(super) fn near_in_order<'a>(
+        &'a self,
+        first: usize,
+        bounds: &'a Bounds,
+        parameters: &ClusterParameters,
+    ) -> impl Iterator<Item = usize> + use<'a> {
+        let last_m = bounds.high_m[0] + bounds.eps_m(parameters);
+        let count = self.eps_squared.len().saturating_sub(LANES);
+        self.find_near(first..count, bounds, parameters, last_m)
+    }
+
+    fn find_near<'a>(
+        &'a self,
+        which: Range<usize>,
+        bounds: &'a Bounds,
+        parameters: &ClusterParameters,
+        last_m: f32,
+    ) -> impl Iterator<Item = usize> + use<'a> {
+        let (mut begin, eps_m) = (which.start, bounds.eps_m(parameters));
+        std::iter::from_fn(move || {
+            let found = next_near(self, begin..which.end, bounds, eps_m, last_m)?;
+            begin = found + 1;
+            Some(found)
+        })
     }
 }
 
+/// The first of some boxes that is near another one; they are looked at until one begins behind
+/// `last_m` along x.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-fn mark_near(
-    (bounds, eps_m): (&Bounds, f32),
-    low_m: [&[f32]; SPACE],
-    high_m: [&[f32]; SPACE],
-    eps_squared: &[f32],
-    marks: &mut [bool],
-) {
-    let count = marks.len();
-    let (low_m, high_m) = (low_m.map(|m| &m[..count]), high_m.map(|m| &m[..count]));
-    let eps_squared = &eps_squared[..count];
-    for place in 0..count {
-        let mut squared = 0.0;
-        for axis in 0..SPACE {
-            let below = bounds.low_m[axis] - high_m[axis][place];
-            let above = low_m[axis][place] - bounds.high_m[axis];
-            let apart = greatest(greatest(below, above), 0.0);
-            squared += apart * apart;
+fn next_near(
+    boxes: &Boxes,
+    which: Range<usize>,
+    bounds: &Bounds,
+    eps_m: f32,
+    last_m: f32,
+) -> Option<usize> {
+    let most = eps_m * eps_m;
+    for begin in which.clone().step_by(LANES) {
+        let lanes = begin..begin + LANES;
+        let (west_m, east_m) = (
+            &boxes.low_m[0][lanes.clone()],
+            &boxes.high_m[0][lanes.clone()],
+        );
+        let (south_m, north_m) = (
+            &boxes.low_m[1][lanes.clone()],
+            &boxes.high_m[1][lanes.clone()],
+        );
+        let (bottom_m, top_m) = (
+            &boxes.low_m[2][lanes.clone()],
+            &boxes.high_m[2][lanes.clone()],
+        );
+        let eps_squared = &boxes.eps_squared[lanes];
+        if west_m[0] > last_m {
+            return None;
         }
-        marks[place] = squared <= least(eps_m * eps_m, eps_squared[place]);
+        let apart_m = |axis: usize, low_m: f32, high_m: f32| {
+            let outside_m = greatest(bounds.low_m[axis] - high_m, low_m - bounds.high_m[axis]);
+            greatest(outside_m, 0.0)
+        };
+        let mut excess = [0.0; LANES];
+        for lane in 0..LANES {
+            let dx = apart_m(0, west_m[lane], east_m[lane]);
+            let dy = apart_m(1, south_m[lane], north_m[lane]);
+            let dz = apart_m(2, bottom_m[lane], top_m[lane]);
+            let squared = dx * dx + dy * dy + dz * dz;
+            excess[lane] = squared - least(most, eps_squared[lane]);
+        }
+        let mut is_any = false;
+        for excess in excess {
+            is_any |= excess <= 0.0;
+        }
+        if is_any {
+            let first = excess.iter().position(|excess| *excess <= 0.0);
+            return first
+                .map(|lane| begin + lane)
+                .filter(|found| *found < which.end);
+        }
     }
+    None
 }
 
 #[cfg(test)]
@@ -190,8 +237,8 @@ mod tests {
         assert!(expected.len() >= 3, "{expected:?}");
         let found: Vec<usize> = boxes.near(100..300, &own, &parameters).collect();
         assert_eq!(found, expected);
-        let end = boxes.end_of_near(&own, &parameters);
-        assert!(end < 300 && expected.iter().all(|place| *place < end));
+        let found: Vec<usize> = boxes.near_in_order(100, &own, &parameters).collect();
+        assert_eq!(found, expected);
     }
 
     #[test]

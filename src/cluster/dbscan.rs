@@ -1,15 +1,14 @@
 //! DBSCAN over the array.
 
-use std::ops::Range;
+use multiversion::multiversion;
 
-use super::density::Density;
 use super::joining::Joiner;
-use super::returns::{Centre, FARTHEST, Returns, nearer};
-use super::runs::Core;
+use super::rows::{Address, Rows};
+use super::runs::{Core, Runs};
+use super::search::Centre;
 use super::window::{Cone, Windows};
-use super::{ClusterParameters, Clusters};
-use crate::cloud::Scan;
-use crate::float::least;
+use super::{ClusterParameters, Clusters, density};
+use crate::cloud::{CAPACITY, Scan};
 use crate::marks::marked;
 
 /// The cluster step. Its buffers are made once.
@@ -17,10 +16,14 @@ use crate::marks::marked;
 pub struct Dbscan {
     parameters: ClusterParameters,
     windows: Windows,
-    density: Density,
+    rows: Rows,
+    /// Points of which it is not known whether they are core points.
+    open: Vec<Address>,
     /// Points that have neighbours, but are no core points.
     border: Vec<Centre>,
     joiner: Joiner,
+    /// First point in the array of each set of runs, and that set's first run.
+    firsts: Vec<(usize, usize)>,
     /// Cluster of each run.
     numbers: Vec<u16>,
     clusters: Clusters,
@@ -32,9 +35,11 @@ impl Dbscan {
         Self {
             parameters: parameters.clone(),
             windows: Windows::new(parameters),
-            density: Density::new(),
+            rows: Rows::new(),
+            open: vec![],
             border: vec![],
             joiner: Joiner::new(),
+            firsts: vec![],
             numbers: vec![],
             clusters: Clusters::default(),
         }
@@ -48,75 +53,69 @@ impl Dbscan {
     /// Finds the clusters of the returns that `ground` does not mark, and that are not too high
     /// above it.
     pub fn process(&mut self, scan: &Scan, ground: &[bool], heights_m: &[f32]) -> &Clusters {
-        self.windows.prepare(scan);
-        // The few are within any window of an exact search.
-        let few = self.windows.clipped(scan.columns());
-        self.density
-            .count(scan, (ground, heights_m), few, &self.parameters);
-        self.find_core_points(scan);
+        let (rows, windows, parameters) = (&mut self.rows, &mut self.windows, &self.parameters);
+        windows.prepare(scan);
+        rows.fill(scan, (ground, heights_m), parameters);
+        density::count(rows, windows, parameters);
+        find_open(rows, &mut self.open);
+        find_core_points(rows, windows, parameters, &self.open, &mut self.border);
         // From here on only they count.
-        self.density.keep_core(scan.len());
-        let core = Core {
-            parameters: &self.parameters,
-            windows: &self.windows,
-            returns: self.density.returns(scan),
-        };
-        self.joiner.join(&core, &self.density);
+        density::keep_core(rows);
+        self.joiner.join(&Core {
+            parameters,
+            windows,
+            rows,
+        });
         self.number_clusters();
-        self.adopt_border_points(scan);
+        self.adopt_border_points();
         self.collect_points(scan.len());
         &self.clusters
     }
 
-    /// Looks closer at the points of which those close by did not say enough.
-    fn find_core_points(&mut self, scan: &Scan) {
-        self.border.clear();
-        let (returns, is_open, is_core) = self.density.judged(scan);
-        for point in marked(is_open) {
-            let centre = returns.centre(point, &self.parameters);
-            let needed = self.parameters.min_points(centre.range_m);
-            let neighbours = neighbours_up_to(needed, &centre, &returns, &self.windows);
-            is_core[point] = neighbours >= needed;
-            if (2..needed).contains(&neighbours) {
-                self.border.push(centre);
-            }
-        }
-    }
-
-    /// Numbers clusters by their first core point: runs are numbered by theirs already.
+    /// Numbers clusters by their first core point.
     fn number_clusters(&mut self) {
         let Joiner {
             runs, partition, ..
         } = &mut self.joiner;
         let Clusters { ends, .. } = &mut self.clusters;
         partition.flatten();
+        let sets = partition.parents();
+        self.firsts.clear();
         self.numbers.clear();
-        ends.clear();
-        for (run, first) in partition.parents().iter().enumerate() {
-            if *first as usize == run {
-                // There are no more than runs.
-                self.numbers.push(ends.len() as u16);
-                ends.push(0);
+        for (number, (run, set)) in runs.all().iter().zip(sets).enumerate() {
+            let (point, set) = (self.rows.point(run.first()), *set as usize);
+            if set == number {
+                // For now where the set stands among the firsts.
+                self.numbers.push(self.firsts.len() as u16);
+                self.firsts.push((point, set));
             } else {
-                self.numbers.push(self.numbers[*first as usize]);
+                let place = self.numbers[set];
+                self.numbers.push(place);
+                let first = &mut self.firsts[usize::from(place)].0;
+                *first = point.min(*first);
             }
         }
-        for (run, number) in runs.all().iter().zip(&self.numbers) {
-            ends[usize::from(*number)] += run.columns().len();
+        self.firsts.sort_unstable();
+        for (number, (_, set)) in self.firsts.iter().enumerate() {
+            self.numbers[*set] = number as u16;
+        }
+        ends.clear();
+        ends.resize(self.firsts.len(), 0);
+        for (number, (run, set)) in runs.all().iter().zip(sets).enumerate() {
+            self.numbers[number] = self.numbers[*set as usize];
+            ends[usize::from(self.numbers[number])] += run.places().len();
         }
     }
 
     /// A point that is no core point belongs to the cluster of the nearest core point that is
     /// its neighbour (of equally near ones, the first in the array), else to none.
-    fn adopt_border_points(&mut self, scan: &Scan) {
-        let (returns, _, members) = self.density.judged(scan);
+    fn adopt_border_points(&mut self) {
         let runs = &mut self.joiner.runs;
         for centre in &self.border {
-            let (_, core) = nearest(centre, &returns, &self.windows);
-            if let Some(run) = runs.numbers(scan.len()).get(core).copied() {
-                self.clusters.ends[usize::from(self.numbers[usize::from(run)])] += 1;
-                runs.adopt(centre.point, core);
-                members[centre.point] = true;
+            if let Some(core) = nearest(centre, &self.rows, &self.windows) {
+                runs.adopt(self.rows.point(centre.address), core);
+                let run = usize::from(runs.of_points(CAPACITY)[core]);
+                self.clusters.ends[usize::from(self.numbers[run])] += 1;
             }
         }
     }
@@ -134,56 +133,103 @@ impl Dbscan {
             total += std::mem::replace(end, total);
         }
         points.resize(total, 0);
+        let runs = self.joiner.runs.of_points(len);
         members.clear();
-        members.extend_from_slice(&self.density.is_core[..len]);
-        let runs = self.joiner.runs.numbers(len);
+        members.extend(runs.iter().map(|run| *run != Runs::NONE));
+        // Where the next point of the cluster goes to which the last one went.
+        let (mut cluster, mut next) = (0, ends.first().copied().unwrap_or_default());
         for point in marked(members) {
-            let end = &mut ends[usize::from(self.numbers[usize::from(runs[point])])];
-            points[*end] = point as u32;
-            *end += 1;
+            let own = usize::from(self.numbers[usize::from(runs[point])]);
+            if own != cluster {
+                ends[cluster] = next;
+                (cluster, next) = (own, ends[own]);
+            }
+            points[next] = point as u32;
+            next += 1;
+        }
+        if let Some(end) = ends.get_mut(cluster) {
+            *end = next;
         }
     }
 }
 
-/// Columns to either side in which the neighbours of a point are looked for first.
-const FEW: usize = 8;
+/// Finds the points of which those close by did not say enough.
+fn find_open(rows: &Rows, open: &mut Vec<Address>) {
+    open.clear();
+    for (layer, row) in rows.all().iter().enumerate() {
+        let places = row.places();
+        let marked = marked(&row.is_open[places.clone()]);
+        open.extend(marked.map(|place| Address {
+            layer,
+            place: places.start + place,
+        }));
+    }
+}
+
+/// Looks closer at the points of which those close by did not say enough, and notes those that have
+/// neighbours, but not enough.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn find_core_points(
+    rows: &mut Rows,
+    windows: &Windows,
+    parameters: &ClusterParameters,
+    open: &[Address],
+    border: &mut Vec<Centre>,
+) {
+    border.clear();
+    for address in open {
+        let centre = Centre::of(rows, *address, parameters);
+        let needed = parameters.min_points(centre.range_m);
+        let neighbours = neighbours_up_to(needed, &centre, rows, windows);
+        rows.of_mut(address.layer).is_core[address.place] = neighbours >= needed;
+        if (2..needed).contains(&neighbours) {
+            border.push(centre);
+        }
+    }
+}
 
 /// How many neighbours a point has, itself included, if they are less than `needed`; else that many
 /// at least.
-fn neighbours_up_to(needed: u32, centre: &Centre, returns: &Returns<'_>, windows: &Windows) -> u32 {
+#[inline(always)]
+fn neighbours_up_to(needed: u32, centre: &Centre, rows: &Rows, windows: &Windows) -> u32 {
+    let own = centre.address.layer;
     let cone = Cone::around(centre.range_m, centre.eps_m);
-    let (layers, reach) = windows.extent(centre.layer, cone);
-    let count = |stretches: [Range<usize>; 2]| -> u32 {
-        let counts = stretches.map(|columns| returns.count(&columns, &layers, centre));
-        counts.into_iter().sum()
-    };
-    let few = reach.min(FEW);
-    let mut found = count(windows.stretches(centre.column, few, few));
-    if found < needed
-        && let Some(sides) = windows.beside(centre.column, few, reach)
-    {
-        found += sides.into_iter().map(count).sum::<u32>();
+    let (layers, reach) = windows.extent(own, cone);
+    let stretches = windows.stretches(centre.column, reach, reach);
+    let mut found = 0;
+    // Most neighbours are in its own layer, and most of the others above the ground.
+    for layer in (own..layers.end).chain((layers.start..own).rev()) {
+        for columns in stretches.iter().filter(|columns| !columns.is_empty()) {
+            found += centre.count(rows.of(layer), rows.places(layer, columns));
+        }
+        if found >= needed {
+            break;
+        }
     }
     found
 }
 
-/// The nearest neighbour of a point: squared distance and place.
-fn nearest(centre: &Centre, returns: &Returns<'_>, windows: &Windows) -> (f32, usize) {
-    /// Rounding must not lose a point that is as near as the nearest one so far.
-    const SLACK: f32 = 1.001;
+/// The point of the array that is the nearest neighbour of a return; of equally near ones the first.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn nearest(centre: &Centre, rows: &Rows, windows: &Windows) -> Option<usize> {
     let cone = Cone::around(centre.range_m, centre.eps_m);
-    let (layers, reach) = windows.extent(centre.layer, cone);
-    let nearest = |stretches: [Range<usize>; 2]| {
-        let found = stretches.map(|columns| returns.nearest(&columns, &layers, centre));
-        found.into_iter().fold(FARTHEST, nearer)
-    };
-    let few = reach.min(FEW);
-    let found = nearest(windows.stretches(centre.column, few, few));
-    // What is farther than the nearest one so far does not matter.
-    let cone = Cone::around(centre.range_m, least(centre.eps_m, SLACK * found.0.sqrt()));
-    let (_, reach) = windows.extent(centre.layer, cone);
-    let sides = windows.beside(centre.column, few, reach);
-    sides.into_iter().flatten().map(nearest).fold(found, nearer)
+    let (layers, reach) = windows.extent(centre.address.layer, cone);
+    let mut best = (f32::INFINITY, usize::MAX);
+    for layer in layers {
+        let row = rows.of(layer);
+        for columns in windows.stretches(centre.column, reach, reach) {
+            let places = rows.places(layer, &columns);
+            let squared = centre.squared_to_nearest(row, places.clone());
+            if squared < f32::INFINITY
+                && squared <= best.0
+                && let Some(place) = centre.first_at(squared, row, places)
+            {
+                let nearest = (squared, rows.point(Address { layer, place }));
+                best = if nearest < best { nearest } else { best };
+            }
+        }
+    }
+    (best.0 < f32::INFINITY).then_some(best.1)
 }
 
 #[cfg(test)]

@@ -2,12 +2,12 @@
 //! above all road users.
 //!
 //! DBSCAN (Ester et al. 1996) without a tree: the array is sorted by azimuth and elevation
-//! already, so that the neighbours of a point stand in a few columns of it. `density` counts those
-//! close by on a `raster`, which is enough for most points; `window` says in which columns and
-//! layers all others can be, and `returns` compares points there; `dbscan` is the algorithm,
-//! `joining` says which core points belong together: those that follow each other are `runs`, those
-//! that meet are `sets` of runs, and of sets only those whose `boxes` are near each other are looked
-//! at closer.
+//! already, so that the neighbours of a point stand in a few columns of it. What is clustered is put
+//! into `rows` without gaps, one for each layer. `density` counts the neighbours close by, which is
+//! enough for most points; `window` says in which columns and layers all others can be, and `search`
+//! compares a point with what stands there; `dbscan` is the algorithm. `joining` says which core
+//! points belong together: those that follow each other are `runs`, those that meet are `sets` of
+//! runs, and of sets only those whose `boxes` are near each other are looked at closer.
 
 mod boxes;
 
@@ -17,11 +17,11 @@ mod density;
 
 mod joining;
 
-mod raster;
-
-mod returns;
+mod rows;
 
 mod runs;
+
+mod search;
 
 mod sets;
 

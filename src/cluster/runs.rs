@@ -6,10 +6,12 @@ use multiversion::multiversion;
 
 use super::ClusterParameters;
 use super::boxes::Bounds;
-use super::density::Density;
-use super::returns::Returns;
+use super::rows::{Address, LENGTH, Row, Rows};
+use super::search::Centre;
 use super::window::{Cone, Windows};
-use crate::cloud::{CAPACITY, MAX_LAYERS};
+use crate::cloud::{CAPACITY, MAX_COLUMNS, MAX_LAYERS};
+use crate::float::least;
+use crate::marks::marked;
 
 /// What is known of a revolution's core points before they are joined.
 #[derive(Clone, Copy)]
@@ -17,82 +19,110 @@ pub(super) struct Core<'a> {
     pub(super) parameters: &'a ClusterParameters,
     pub(super) windows: &'a Windows,
     /// Nothing but core points is looked at.
-    pub(super) returns: Returns<'a>,
+    pub(super) rows: &'a Rows,
 }
 
-/// Core points of one layer in columns that follow each other, each a neighbour of the one before.
+impl Core<'_> {
+    /// Whether two core points are neighbours.
+    pub(super) fn are_neighbours(&self, a: Address, b: Address) -> bool {
+        let column = |address: Address| self.rows.of(address.layer).column(address.place);
+        self.rows.are_neighbours(a, b) && self.windows.are_in_reach(column(a), column(b))
+    }
+}
+
+/// Core points of one layer that follow each other, each a neighbour of the one before.
 #[derive(Debug, Clone)]
 pub(super) struct Run {
-    layer: u8,
-    columns: Range<u16>,
+    layer: u16,
+    places: Range<u16>,
     /// Around its points.
     pub(super) bounds: Bounds,
 }
 
-/// No run of any point has the number of none.
-const _: () = assert!(CAPACITY < Runs::NONE as usize);
-
 impl Run {
-    /// Its columns.
-    pub(super) fn columns(&self) -> Range<usize> {
-        usize::from(self.columns.start)..usize::from(self.columns.end)
-    }
-
     /// Its layer.
     fn layer(&self) -> usize {
         usize::from(self.layer)
     }
 
-    /// Its point in a column.
-    pub(super) fn point(&self, column: usize) -> usize {
-        column * MAX_LAYERS + self.layer()
+    /// Its places in the row of its layer.
+    pub(super) fn places(&self) -> Range<usize> {
+        usize::from(self.places.start)..usize::from(self.places.end)
+    }
+
+    /// Where its first point stands.
+    pub(super) fn first(&self) -> Address {
+        Address {
+            layer: self.layer(),
+            place: usize::from(self.places.start),
+        }
+    }
+
+    /// Where its last point stands.
+    pub(super) fn last(&self) -> Address {
+        Address {
+            layer: self.layer(),
+            place: usize::from(self.places.end) - 1,
+        }
     }
 
     /// Whether any of its points is a neighbour of any of another run.
     pub(super) fn touches(&self, other: &Self, core: &Core<'_>) -> bool {
         // What is short is looked at point by point.
-        let (short, long) = if self.columns().len() < other.columns().len() {
+        let (short, long) = if self.places.len() < other.places.len() {
             (self, other)
         } else {
             (other, self)
         };
-        // Its nearest point reaches farthest.
-        let nearest_m = short.bounds.nearest_m();
-        let cone = Cone::around(nearest_m, core.parameters.eps_m(nearest_m));
-        let (_, reach) = core.windows.extent(short.layer(), cone);
-        for near in core.windows.around(&long.columns(), reach) {
-            for column in overlap(&near, &short.columns()) {
-                let point = short.point(column);
-                let squared = long
-                    .bounds
-                    .squared_distance_to(core.returns.position_m(point));
-                if squared > core.returns.eps_squared[point] {
-                    continue;
-                }
-                for stretch in core.windows.stretches(column, reach, reach) {
-                    let mut both = overlap(&stretch, &long.columns());
-                    if both.any(|column| core.returns.are_neighbours(point, long.point(column))) {
-                        return true;
-                    }
-                }
-            }
-        }
-        false
+        touch(short, long, core)
     }
 }
 
-/// All runs, in the order in which the array has their first points. Its buffers are made once.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn touch(short: &Run, long: &Run, core: &Core<'_>) -> bool {
+    let Core {
+        parameters,
+        windows,
+        rows,
+    } = *core;
+    let (row, other) = (rows.of(short.layer()), rows.of(long.layer()));
+    // Its nearest point reaches farthest.
+    let nearest_m = short.bounds.nearest_m();
+    let cone = Cone::around(nearest_m, parameters.eps_m(nearest_m));
+    let (_, reach) = windows.extent(short.layer(), cone);
+    for place in short.places() {
+        let squared = long.bounds.squared_distance_to(row.position_m(place));
+        if squared > row.eps_squared[place] {
+            continue;
+        }
+        let address = Address {
+            layer: short.layer(),
+            place,
+        };
+        let centre = Centre::of(rows, address, parameters);
+        for columns in windows.stretches(centre.column, reach, reach) {
+            let places = overlap(&rows.places(long.layer(), &columns), &long.places());
+            if centre.has_any(other, places) {
+                return true;
+            }
+        }
+    }
+    false
+}
+
+/// All runs, layer by layer. Its buffers are made once.
 #[derive(Debug, Clone)]
 pub(super) struct Runs {
     /// There are no more than points, so that 16 bits hold the number of one.
     runs: Vec<Run>,
-    /// The number of every point's run, or [`Runs::NONE`].
+    /// The number of the run of every point of the array, or [`Runs::NONE`].
     of: Box<[u16; CAPACITY]>,
-    /// Where runs begin, or have just ended.
-    edges: Box<[bool; CAPACITY]>,
-    /// The runs that go on.
-    open: [u16; MAX_LAYERS],
+    /// Where runs of a row begin, or have just ended.
+    edges: Box<[bool; LENGTH]>,
 }
+
+/// No run of any point has the number of none.
+const _: () = assert!(CAPACITY < Runs::NONE as usize);
 
 impl Runs {
     /// The number of no run.
@@ -102,8 +132,7 @@ impl Runs {
         Self {
             runs: vec![],
             of: Box::new([Self::NONE; CAPACITY]),
-            edges: Box::new([false; CAPACITY]),
-            open: [Self::NONE; MAX_LAYERS],
+            edges: Box::new([false; LENGTH]),
         }
     }
 
@@ -117,86 +146,73 @@ impl Runs {
         self.of[point] = self.of[other];
     }
 
-    /// The number of every point's run, or [`Runs::NONE`].
-    pub(super) fn numbers(&self, len: usize) -> &[u16] {
+    /// The numbers of the runs of the first points of the array, or [`Runs::NONE`].
+    pub(super) fn of_points(&self, len: usize) -> &[u16] {
         &self.of[..len]
     }
 
     /// Finds the runs anew.
-    pub(super) fn find(&mut self, returns: &Returns<'_>, density: &Density) {
-        let len = returns.x_m.len();
+    pub(super) fn find(&mut self, rows: &Rows, windows: &Windows) {
+        let most_columns = windows.most_columns().unwrap_or(MAX_COLUMNS) as u16;
         self.runs.clear();
-        self.open = [Self::NONE; MAX_LAYERS];
-        let is_core = &density.is_core[..len];
-        mark_edges(is_core, &density.follows[..len], &mut self.edges[..len]);
-        let is_core = is_core.as_chunks::<MAX_LAYERS>().0.iter();
-        for (column, is_core) in is_core.enumerate() {
-            let edges = &self.edges.as_chunks().0[column];
-            // A byte for each layer, the first one lowest; those that were met are taken out.
-            let mut edges = u128::from_le_bytes(edges.map(u8::from));
-            while edges != 0 {
-                let layer = edges.trailing_zeros() as usize / 8;
-                edges &= edges - 1;
-                self.end(layer, column, returns);
-                if is_core[layer] {
-                    self.begin(layer, column);
+        self.of.fill(Self::NONE);
+        for (layer, row) in rows.all().iter().enumerate() {
+            mark_edges(row, most_columns, &mut self.edges);
+            let mut begin = None;
+            for edge in marked(&self.edges[..=row.places().end]) {
+                if let Some(begin) = begin {
+                    let number = self.runs.len() as u16;
+                    for column in &row.column[begin..edge] {
+                        self.of[usize::from(*column) * MAX_LAYERS + layer] = number;
+                    }
+                    self.runs.push(Run {
+                        layer: layer as u16,
+                        places: begin as u16..edge as u16,
+                        bounds: bounds_of(row, begin..edge),
+                    });
                 }
+                begin = row.is_core[edge].then_some(edge);
             }
-            let of: &mut [u16; MAX_LAYERS] = &mut self.of.as_chunks_mut().0[column];
-            *of = self.open;
-        }
-        for layer in 0..MAX_LAYERS {
-            self.end(layer, len / MAX_LAYERS, returns);
-        }
-    }
-
-    /// Begins a run.
-    fn begin(&mut self, layer: usize, column: usize) {
-        self.open[layer] = self.runs.len() as u16;
-        let column = column as u16;
-        self.runs.push(Run {
-            layer: layer as u8,
-            columns: column..column,
-            // Found when it ends.
-            bounds: Bounds::NONE,
-        });
-    }
-
-    /// Ends the run that goes on in a layer, if there is one, before a column.
-    fn end(&mut self, layer: usize, column: usize, returns: &Returns<'_>) {
-        let number = std::mem::replace(&mut self.open[layer], Self::NONE);
-        if let Some(run) = self.runs.get_mut(usize::from(number)) {
-            run.columns.end = column as u16;
-            let mut bounds = Bounds::NONE;
-            for column in run.columns() {
-                let point = run.point(column);
-                let [x, y, z] = returns.position_m(point);
-                bounds.hold([x, y, z, returns.range_m[point]]);
-            }
-            run.bounds = bounds;
         }
     }
 }
 
-/// The columns of two stretches.
+/// The box around some places of a row.
+fn bounds_of(row: &Row, places: Range<usize>) -> Bounds {
+    let mut bounds = Bounds::NONE;
+    for place in places {
+        let [x, y, z] = row.position_m(place);
+        bounds.hold([x, y, z, row.range_m[place]]);
+    }
+    bounds
+}
+
+/// What two stretches have in common.
 fn overlap(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
-    a.start.max(b.start)..a.end.min(b.end)
+    let start = a.start.max(b.start);
+    start..a.end.min(b.end).max(start)
 }
 
-/// Marks the columns where a stretch of core points that follow each other begins, and those
+/// Marks the places where a stretch of core points that follow each other begins, and those
 /// behind where one ends.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-fn mark_edges(is_core: &[bool], follows: &[bool], edges: &mut [bool]) {
-    if is_core.len() < MAX_LAYERS {
-        return;
-    }
-    edges[..MAX_LAYERS].copy_from_slice(&is_core[..MAX_LAYERS]);
-    let pairs = is_core.len() - MAX_LAYERS;
-    let (before, is_core) = (&is_core[..pairs], &is_core[MAX_LAYERS..]);
-    let (follows, edges) = (&follows[MAX_LAYERS..], &mut edges[MAX_LAYERS..]);
-    let (is_core, follows, edges) = (&is_core[..pairs], &follows[..pairs], &mut edges[..pairs]);
-    for pair in 0..pairs {
-        edges[pair] =
-            (before[pair] | is_core[pair]) & !(before[pair] & is_core[pair] & follows[pair]);
+fn mark_edges(row: &Row, most_columns: u16, edges: &mut [bool; LENGTH]) {
+    let places = 1..row.places().end + 1;
+    let before = 0..row.places().end;
+    let pairs = [&row.x_m, &row.y_m, &row.z_m, &row.eps_squared]
+        .map(|metres| (&metres[before.clone()], &metres[places.clone()]));
+    let [x_m, y_m, z_m, eps_squared] = pairs;
+    let columns = (&row.column[before.clone()], &row.column[places.clone()]);
+    let is_core = (&row.is_core[before], &row.is_core[places.clone()]);
+    let edges = &mut edges[places];
+    for (place, edge) in edges.iter_mut().enumerate() {
+        let dx = x_m.1[place] - x_m.0[place];
+        let dy = y_m.1[place] - y_m.0[place];
+        let dz = z_m.1[place] - z_m.0[place];
+        let squared = dx * dx + dy * dy + dz * dz;
+        let is_near = squared <= least(eps_squared.0[place], eps_squared.1[place]);
+        let is_beside = columns.1[place].wrapping_sub(columns.0[place]) <= most_columns;
+        let (is_core, was_core) = (is_core.1[place], is_core.0[place]);
+        *edge = (is_core | was_core) & !(is_core & was_core & is_near & is_beside);
     }
 }

@@ -86,10 +86,9 @@ impl Sets {
     /// Joins the sets of which any runs touch each other.
     pub(super) fn join(&mut self, runs: &[Run], partition: &mut Partition, core: &Core<'_>) {
         for (place, set) in self.sets.iter().enumerate() {
-            let end = self.boxes.end_of_near(&set.bounds, core.parameters);
             let others = self
                 .boxes
-                .near(place + 1..end, &set.bounds, core.parameters);
+                .near_in_order(place + 1, &set.bounds, core.parameters);
             for other in others.map(|other| &self.sets[other]) {
                 if partition.find(set.first) != partition.find(other.first)
                     && self.members.touch(set, other, runs, core)
@@ -106,30 +105,19 @@ impl Sets {
 struct Members {
     runs: Vec<u32>,
     boxes: Boxes,
-    /// Those of one set that are near another one.
-    near: Vec<u32>,
-    near_boxes: Boxes,
 }
 
 impl Members {
     /// Whether any runs of two sets touch each other.
-    fn touch(&mut self, set: &Set, other: &Set, runs: &[Run], core: &Core<'_>) -> bool {
-        let parameters = core.parameters;
-        let run = |number: u32| &runs[number as usize];
-        let near = self
-            .boxes
-            .near(set.members.clone(), &other.bounds, parameters);
-        self.near.clear();
-        self.near.extend(near.map(|member| self.runs[member]));
-        let bounds = self.near.iter().map(|number| &run(*number).bounds);
-        self.near_boxes.set(bounds, parameters);
-        let others = self
-            .boxes
-            .near(other.members.clone(), &set.bounds, parameters);
-        others.map(|member| run(self.runs[member])).any(|other| {
-            let all = 0..self.near.len();
-            let mut near = self.near_boxes.near(all, &other.bounds, parameters);
-            near.any(|place| run(self.near[place]).touches(other, core))
+    fn touch(&self, set: &Set, other: &Set, runs: &[Run], core: &Core<'_>) -> bool {
+        let run = |member: usize| &runs[self.runs[member] as usize];
+        let near = |members: &Range<usize>, bounds| {
+            let near = self.boxes.near(members.clone(), bounds, core.parameters);
+            near.map(run)
+        };
+        near(&set.members, &other.bounds).any(|own| {
+            let mut others = near(&other.members, &own.bounds);
+            others.any(|other| own.touches(other, core))
         })
     }
 }

@@ -140,37 +140,19 @@ impl Windows {
         reach.min(self.columns / 2)
     }
 
-    /// So many columns, as far as neighbours so far off count at all: to an exact window all do.
-    pub(super) fn clipped(&self, columns: usize) -> usize {
+    /// How many columns off neighbours are at most, if that is set: otherwise eps says it.
+    pub(super) fn most_columns(&self) -> Option<usize> {
         match self.setting {
-            WindowSetting::Exact => columns,
-            WindowSetting::Columns => columns.min(self.fixed_columns),
+            WindowSetting::Exact => None,
+            WindowSetting::Columns => Some(self.fixed_columns),
         }
     }
 
-    /// The columns within `reach` of any of `columns`.
-    pub(super) fn around(&self, columns: &Range<usize>, reach: usize) -> [Range<usize>; 2] {
-        self.stretches(columns.start, reach, columns.len() - 1 + reach)
-    }
-
-    /// The columns that are more than `few` and at most `reach` off a column, to the one side and
-    /// to the other, each of them once; `None` if there are none.
-    pub(super) fn beside(
-        &self,
-        column: usize,
-        few: usize,
-        reach: usize,
-    ) -> Option<[[Range<usize>; 2]; 2]> {
-        let more = reach.checked_sub(few + 1)?;
-        let columns = self.columns;
-        let left = self.stretches((column + columns - few - 1) % columns, more, 0);
-        // The sides may meet in the column behind.
-        let rest = columns - (2 * few + 1) - (more + 1);
-        let right = match rest.min(more + 1) {
-            0 => [0..0, 0..0],
-            count => self.stretches((column + few + 1) % columns, 0, count - 1),
-        };
-        Some([left, right])
+    /// Whether two columns are not too far from each other for neighbours.
+    pub(super) fn are_in_reach(&self, a: usize, b: usize) -> bool {
+        let apart = a.abs_diff(b);
+        let apart = apart.min(self.columns - apart);
+        self.most_columns().is_none_or(|most| apart <= most)
     }
 
     /// The columns from `reach` before to `after` behind a column, over the seam at 0: at
@@ -211,30 +193,6 @@ mod tests {
         assert_eq!(windows.stretches(98, 3, 3), [95..100, 0..2]);
         assert_eq!(windows.stretches(99, 0, 0), [99..100, 0..0]);
         assert_eq!(windows.stretches(5, 50, 50), [0..100, 0..0]);
-    }
-
-    #[test]
-    fn what_is_beside_a_column_is_each_column_once() {
-        for columns in [3, 18, 19] {
-            let windows = windows(columns, Profile::Default);
-            for (few, reach) in
-                (0..columns / 2).flat_map(|few| (few..=columns / 2).map(move |reach| (few, reach)))
-            {
-                for column in 0..columns {
-                    let near = windows.stretches(column, few, few).into_iter().flatten();
-                    let beside = windows.beside(column, few, reach).into_iter().flatten();
-                    let mut all: Vec<_> = near.chain(beside.flatten().flatten()).collect();
-                    all.sort_unstable();
-                    let within = windows
-                        .stretches(column, reach, reach)
-                        .into_iter()
-                        .flatten();
-                    let mut expected: Vec<_> = within.collect();
-                    expected.sort_unstable();
-                    assert_eq!(all, expected, "{columns} {column} {few} {reach}");
-                }
-            }
-        }
     }
 
     #[test]

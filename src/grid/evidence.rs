@@ -160,7 +160,7 @@ impl Evidence {
             tos_m[layer] = least(landed_m, roofs_m[layer]);
             froms_m[layer] = greatest(from_m(until_m, runs[layer]), before_m);
             let is_over = (returns_m[layer] < NONE_M) & (ends_m[layer] > before_m);
-            passes |= u16::from(is_over & (froms_m[layer] < tos_m[layer])) << layer;
+            passes |= u32::from(is_over & (froms_m[layer] < tos_m[layer])) << layer;
         }
         for layer in set_bits(passes) {
             stretches.add(froms_m[layer], tos_m[layer]);

@@ -113,7 +113,7 @@ impl Filter {
                 is_occupied[cell] = i16::from(before[cell] > 0);
             }
             if any(is_occupied) {
-                for cell in set_bits(cells).filter(|cell| before[*cell] > 0) {
+                for cell in set_bits(cells.into()).filter(|cell| before[*cell] > 0) {
                     let place = [f64::from(east) + cell as f64, f64::from(north)];
                     let at_m = [0, 1].map(|axis| sensor_m[axis] + place[axis] * self.cell_m);
                     let distance_m = libm::hypot(place[0], place[1]) * self.cell_m;

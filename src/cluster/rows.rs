@@ -1,0 +1,406 @@
+//! The returns that are clustered, layer by layer: those of a layer stand side by side in the order
+//! of their columns, whatever the rays between them met.
+
+use std::ops::Range;
+
+use multiversion::multiversion;
+
+use super::ClusterParameters;
+use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, Scan};
+use crate::float::least;
+use crate::marks::set_bits;
+
+/// The returns of one layer, by their places in the row.
+#[derive(Debug, Clone)]
+pub(super) struct Row {
+    pub(super) x_m: [f32; LENGTH],
+    pub(super) y_m: [f32; LENGTH],
+    pub(super) z_m: [f32; LENGTH],
+    pub(super) range_m: [f32; LENGTH],
+    /// Square of the distance within which others are neighbours, if they are farther off; negative
+    /// for what is not looked at, of which nothing is a neighbour.
+    pub(super) eps_squared: [f32; LENGTH],
+    pub(super) column: [u16; LENGTH],
+    /// Which of the returns directly above and below it in its column are neighbours: [`ABOVE`],
+    /// [`BELOW`], or both.
+    met: [u8; LENGTH],
+    /// How many neighbours close by were counted, itself included.
+    pub(super) found: [f32; LENGTH],
+    /// Whether it is a core point.
+    pub(super) is_core: [bool; LENGTH],
+    /// Whether that is not known yet.
+    pub(super) is_open: [bool; LENGTH],
+    /// Behind the last one. The first one stands at [`MARGIN`].
+    end: usize,
+}
+
+/// Places at either end of a row in which nothing stands, so that what is compared with what is near
+/// and many at once need not mind where it ends.
+pub(super) const MARGIN: usize = 16;
+/// Places of a row. An odd number of cache lines: otherwise all rows would share a few of them.
+pub(super) const LENGTH: usize = MAX_COLUMNS + 2 * MARGIN;
+/// Marks of a return that is a neighbour of that directly above, and below.
+const ABOVE: u8 = 1;
+const BELOW: u8 = 2;
+/// No square of a distance: nothing is within it.
+pub(super) const NOT_TAKEN: f32 = -1.0;
+
+impl Row {
+    const EMPTY: Self = Self {
+        x_m: [0.0; LENGTH],
+        y_m: [0.0; LENGTH],
+        z_m: [0.0; LENGTH],
+        range_m: [0.0; LENGTH],
+        eps_squared: [NOT_TAKEN; LENGTH],
+        column: [0; LENGTH],
+        met: [0; LENGTH],
+        found: [0.0; LENGTH],
+        is_core: [false; LENGTH],
+        is_open: [false; LENGTH],
+        end: MARGIN,
+    };
+
+    /// The places at which something stands.
+    pub(super) fn places(&self) -> Range<usize> {
+        MARGIN..self.end
+    }
+
+    /// The column of a place.
+    pub(super) fn column(&self, place: usize) -> usize {
+        usize::from(self.column[place])
+    }
+
+    /// How many of the returns directly above and below one in its column are neighbours.
+    #[inline(always)]
+    pub(super) fn met(&self, place: usize) -> u8 {
+        self.met[place] % BELOW + self.met[place] / BELOW
+    }
+
+    /// Whether that directly above one is.
+    pub(super) fn meets_above(&self, place: usize) -> bool {
+        self.met[place] & ABOVE > 0
+    }
+
+    /// Where a return is.
+    #[inline(always)]
+    pub(super) fn position_m(&self, place: usize) -> [f32; 3] {
+        [self.x_m[place], self.y_m[place], self.z_m[place]]
+    }
+}
+
+/// Where a return stands: its layer, and its place in the row of that.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Address {
+    pub(super) layer: usize,
+    pub(super) place: usize,
+}
+
+/// The rows of all layers. Their buffers are made once.
+#[derive(Debug, Clone)]
+pub(super) struct Rows {
+    /// By layer.
+    rows: Vec<Row>,
+    /// Of each column and layer the place of the first return that is not before the column; one
+    /// column more than there are.
+    first: Vec<[u16; MAX_LAYERS]>,
+}
+
+impl Rows {
+    pub(super) fn new() -> Self {
+        Self {
+            rows: vec![Row::EMPTY; MAX_LAYERS],
+            first: Vec::with_capacity(MAX_COLUMNS + 1),
+        }
+    }
+
+    /// Takes over the returns that `ground` does not mark and that are not too high above it.
+    pub(super) fn fill(
+        &mut self,
+        scan: &Scan,
+        (ground, heights_m): (&[bool], &[f32]),
+        parameters: &ClusterParameters,
+    ) {
+        self.first.clear();
+        for row in &mut self.rows {
+            row.end = MARGIN;
+        }
+        fill(self, &Points::of(scan, ground, heights_m), parameters);
+        for row in &mut self.rows {
+            find_eps(row, parameters);
+            let behind = row.end..row.end + MARGIN;
+            row.eps_squared[behind.clone()].fill(NOT_TAKEN);
+            row.is_core[behind.clone()].fill(false);
+            row.is_open[behind].fill(false);
+        }
+    }
+
+    /// The row of a layer.
+    pub(super) fn of(&self, layer: usize) -> &Row {
+        &self.rows[layer]
+    }
+
+    /// The row of a layer, to be changed.
+    pub(super) fn of_mut(&mut self, layer: usize) -> &mut Row {
+        &mut self.rows[layer]
+    }
+
+    /// All rows, by layer.
+    pub(super) fn all(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// All rows, by layer, to be changed.
+    pub(super) fn all_mut(&mut self) -> &mut [Row] {
+        &mut self.rows
+    }
+
+    /// The places of a row in a stretch of columns.
+    #[inline(always)]
+    pub(super) fn places(&self, layer: usize, columns: &Range<usize>) -> Range<usize> {
+        let first = |column: usize| usize::from(self.first[column][layer]);
+        first(columns.start)..first(columns.end)
+    }
+
+    /// The place of the first return of a layer in the columns behind one.
+    pub(super) fn first_behind(&self, layer: usize, column: usize) -> usize {
+        usize::from(self.first[column + 1][layer])
+    }
+
+    /// How many points the array has.
+    pub(super) fn points(&self) -> usize {
+        (self.first.len() - 1) * MAX_LAYERS
+    }
+
+    /// The point of the array that stands somewhere.
+    pub(super) fn point(&self, address: Address) -> usize {
+        self.rows[address.layer].column(address.place) * MAX_LAYERS + address.layer
+    }
+
+    /// Whether two returns are neighbours.
+    #[inline(always)]
+    pub(super) fn are_neighbours(&self, a: Address, b: Address) -> bool {
+        let (row, other) = (&self.rows[a.layer], &self.rows[b.layer]);
+        let most = least(row.eps_squared[a.place], other.eps_squared[b.place]);
+        squared_distance(row.position_m(a.place), other.position_m(b.place)) <= most
+    }
+}
+
+/// Square of the distance of two points.
+#[inline(always)]
+pub(super) fn squared_distance(a_m: [f32; 3], b_m: [f32; 3]) -> f32 {
+    let [dx, dy, dz] = [0, 1, 2].map(|axis: usize| a_m[axis] - b_m[axis]);
+    dx * dx + dy * dy + dz * dz
+}
+
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn find_eps(row: &mut Row, parameters: &ClusterParameters) {
+    let places = row.places();
+    let range_m = &row.range_m[places.clone()];
+    for (eps_squared, range_m) in row.eps_squared[places].iter_mut().zip(range_m) {
+        let eps_m = parameters.eps_m(*range_m);
+        *eps_squared = eps_m * eps_m;
+    }
+}
+
+/// What a revolution is made of, column by column.
+struct Points<'a> {
+    x_m: &'a [Column],
+    y_m: &'a [Column],
+    z_m: &'a [Column],
+    ranges_m: &'a [Column],
+    heights_m: &'a [Column],
+    ground: &'a [[bool; MAX_LAYERS]],
+}
+
+type Column = [f32; MAX_LAYERS];
+
+/// Columns that are taken over together.
+const AT_ONCE: usize = u32::BITS as usize;
+
+/// A bit for each of some columns, by layer.
+type Bits = [u32; MAX_LAYERS];
+
+impl<'a> Points<'a> {
+    fn of(scan: &'a Scan, ground: &'a [bool], heights_m: &'a [f32]) -> Self {
+        let columns = |metres: &'a [f32]| metres.as_chunks().0;
+        Self {
+            x_m: columns(scan.x_m()),
+            y_m: columns(scan.y_m()),
+            z_m: columns(scan.z_m()),
+            ranges_m: columns(scan.range_m()),
+            heights_m: columns(&heights_m[..scan.len()]),
+            ground: ground[..scan.len()].as_chunks().0,
+        }
+    }
+
+    /// Some of the columns.
+    fn part(&self, columns: &Range<usize>) -> Self {
+        Self {
+            x_m: &self.x_m[columns.clone()],
+            y_m: &self.y_m[columns.clone()],
+            z_m: &self.z_m[columns.clone()],
+            ranges_m: &self.ranges_m[columns.clone()],
+            heights_m: &self.heights_m[columns.clone()],
+            ground: &self.ground[columns.clone()],
+        }
+    }
+
+    /// Which points of a column are to be clustered.
+    #[inline(always)]
+    fn are_taken(&self, column: usize, highest_m: f32) -> [bool; MAX_LAYERS] {
+        let (ranges_m, heights_m) = (&self.ranges_m[column], &self.heights_m[column]);
+        let ground = &self.ground[column];
+        std::array::from_fn(|layer| {
+            (ranges_m[layer] > 0.0) & !ground[layer] & (heights_m[layer] <= highest_m)
+        })
+    }
+
+    /// Which points of a column would be neighbours of the next ones above; of the last one it means
+    /// nothing.
+    #[inline(always)]
+    fn are_near_above(&self, column: usize, parameters: &ClusterParameters) -> [bool; MAX_LAYERS] {
+        let (x_m, y_m) = (&self.x_m[column], &self.y_m[column]);
+        let (z_m, ranges_m) = (&self.z_m[column], &self.ranges_m[column]);
+        std::array::from_fn(|layer| {
+            let above = (layer + 1).min(MAX_LAYERS - 1);
+            let own_m = [x_m[layer], y_m[layer], z_m[layer]];
+            let squared = squared_distance(own_m, [x_m[above], y_m[above], z_m[above]]);
+            let [own, other] = [layer, above].map(|layer| parameters.eps_m(ranges_m[layer]));
+            squared <= least(own * own, other * other)
+        })
+    }
+}
+
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn fill(rows: &mut Rows, points: &Points<'_>, parameters: &ClusterParameters) {
+    let highest_m = parameters.highest_m as f32;
+    let mut next = [MARGIN as u16; MAX_LAYERS];
+    let columns = points.x_m.len();
+    for begin in (0..columns).step_by(AT_ONCE) {
+        let block = points.part(&(begin..(begin + AT_ONCE).min(columns)));
+        let (mut taken, mut near): (Bits, Bits) = Default::default();
+        for column in 0..block.x_m.len() {
+            rows.first.push(next);
+            let (are_taken, are_near) = (
+                block.are_taken(column, highest_m),
+                block.are_near_above(column, parameters),
+            );
+            for layer in 0..MAX_LAYERS {
+                taken[layer] |= u32::from(are_taken[layer]) << column;
+                near[layer] |= u32::from(are_near[layer]) << column;
+                next[layer] += u16::from(are_taken[layer]);
+            }
+        }
+        append(&mut rows.rows, &block, begin, &taken, &near);
+    }
+    rows.first.push(next);
+}
+
+/// Appends what is taken of a block of columns to the rows.
+#[inline(always)]
+fn append(rows: &mut [Row], block: &Points<'_>, begin: usize, taken: &Bits, near: &Bits) {
+    let mut below = 0;
+    for (layer, row) in rows.iter_mut().enumerate() {
+        let taken_above = taken.get(layer + 1).copied().unwrap_or_default();
+        let above = near[layer] & taken[layer] & taken_above;
+        let mut place = row.end;
+        for column in set_bits(taken[layer]) {
+            row.x_m[place] = block.x_m[column][layer];
+            row.y_m[place] = block.y_m[column][layer];
+            row.z_m[place] = block.z_m[column][layer];
+            row.range_m[place] = block.ranges_m[column][layer];
+            row.column[place] = (begin + column) as u16;
+            let [above, below] = [above, below].map(|met| (met >> column) as u8 & 1);
+            row.met[place] = above * ABOVE + below * BELOW;
+            place += 1;
+        }
+        row.end = place;
+        below = above;
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::cloud::tests::scan_of;
+    use crate::parameter::Profile;
+
+    /// The rows of a scan without ground.
+    pub(in super::super) fn rows_of(scan: &Scan, parameters: &ClusterParameters) -> Rows {
+        let mut rows = Rows::new();
+        let (ground, heights_m) = (vec![false; scan.len()], vec![0.0; scan.len()]);
+        rows.fill(scan, (&ground, &heights_m), parameters);
+        rows
+    }
+
+    #[test]
+    fn rows_hold_what_is_taken_in_the_order_of_columns_and_nothing_of_a_larger_revolution() {
+        let parameters = ClusterParameters::profile(Profile::Default);
+        let all = scan_of(2000, |_, _| 1000);
+        let mut rows = rows_of(&all, &parameters);
+        assert_eq!(rows.of(15).places().len(), 2000);
+        // More columns than are taken over together, and no whole number of blocks.
+        let scan = scan_of(70, |column, layer| match (column % 3, layer) {
+            (_, 9) => 0,
+            (0, _) => 300,
+            _ => 500,
+        });
+        let points = |chosen: fn(usize, usize) -> bool| -> Vec<bool> {
+            let is_chosen = |point| chosen(point / MAX_LAYERS, point % MAX_LAYERS);
+            (0..scan.len()).map(is_chosen).collect()
+        };
+        let ground = points(|_, layer| layer < 2);
+        let high = points(|column, layer| column > 60 && layer > 12);
+        let heights_m: Vec<f32> = high.iter().map(|high| f32::from(*high) * 4.6).collect();
+        rows.fill(&scan, (&ground, &heights_m), &parameters);
+        for (layer, row) in rows.all().iter().enumerate() {
+            let taken = |column: &usize| {
+                let point = scan.index(*column, layer);
+                scan.has_return(point) && !ground[point] && !high[point]
+            };
+            let columns: Vec<usize> = (0..70).filter(taken).collect();
+            let found: Vec<usize> = row.places().map(|place| row.column(place)).collect();
+            assert_eq!(found, columns, "{layer}");
+            assert!(row.eps_squared[row.places().end..][..MARGIN] == [NOT_TAKEN; MARGIN]);
+            for place in row.places() {
+                let point = rows.point(Address { layer, place });
+                assert_eq!(row.position_m(place), scan.point_m(point));
+                assert_eq!(row.range_m[place], scan.range_m()[point]);
+                let eps_m = parameters.eps_m(row.range_m[place]);
+                assert_eq!(row.eps_squared[place], eps_m * eps_m);
+            }
+            let few = rows.places(layer, &(33..36));
+            assert_eq!(few.len(), (33..36).filter(taken).count());
+            assert!(
+                few.clone()
+                    .all(|place| (33..36).contains(&row.column(place)))
+            );
+            assert_eq!(rows.first_behind(layer, 35), few.end);
+        }
+        assert_eq!(rows.points(), 70 * MAX_LAYERS);
+    }
+
+    #[test]
+    fn returns_meet_those_directly_above_that_are_taken_and_near() {
+        let parameters = ClusterParameters::profile(Profile::Default);
+        // Layers are 2 degrees apart: 0.35 m at 10 m, where neighbours are within 0.72 m.
+        let scan = scan_of(40, |column, layer| match (column, layer) {
+            (35, 3..6) => 1000,
+            (35, 6) => 1200,
+            (35, 8 | 10 | 15) => 1000,
+            (36, 0) => 1000,
+            _ => 0,
+        });
+        let rows = rows_of(&scan, &parameters);
+        let meets = |layer: usize| {
+            let row = rows.of(layer);
+            let place = row.places().find(|place| row.column(*place) == 35).unwrap();
+            (row.met(place), row.meets_above(place))
+        };
+        assert_eq!(
+            [3, 4, 5, 6].map(meets),
+            [(1, true), (2, true), (1, false), (0, false)]
+        );
+        assert_eq!([8, 10, 15].map(meets), [(0, false); 3]);
+    }
+}
