@@ -112,9 +112,15 @@ fn are_neighbours(scan: &Scan, parameters: &ClusterParameters, a: usize, b: usiz
 /// core neighbour; everything else is noise.
 fn assert_is_dbscan(scan: &Scan, ground: &[bool], parameters: &ClusterParameters) -> usize {
     let heights_m: Vec<f32> = scan.z_m().iter().map(|z| z + 2.0).collect();
-    let clusters = Dbscan::new(parameters)
-        .process(scan, ground, &heights_m)
-        .clone();
+    let mut dbscan = Dbscan::new(parameters);
+    // Nothing must be left of the revolution before, which had more columns.
+    let before = scan_of(&random_distances(1, 500, 0.1), 0.01, 359.0);
+    dbscan.process(
+        &before,
+        &vec![false; before.len()],
+        &vec![0.0; before.len()],
+    );
+    let clusters = dbscan.process(scan, ground, &heights_m).clone();
     let labels = clusters.labels();
     let is_too_high = |height_m: &f32| f64::from(*height_m) > parameters.highest_m;
     let heights = heights_m.iter().map(is_too_high);
@@ -144,12 +150,10 @@ fn assert_is_dbscan(scan: &Scan, ground: &[bool], parameters: &ClusterParameters
         let expected = nearest.map_or(Clusters::NONE, |core| labels[core]);
         assert_eq!(label, expected, "border point {point}");
     }
-    component_of_cluster.sort_unstable();
-    component_of_cluster.dedup();
-    assert_eq!(
-        component_of_cluster.len(),
-        clusters.len(),
-        "a component in two clusters"
+    // A component is named after its first core point.
+    assert!(
+        component_of_cluster.is_sorted_by(|a, b| a < b),
+        "a component in two clusters, or not in order: {component_of_cluster:?}"
     );
     truth.points.len()
 }
@@ -159,7 +163,7 @@ fn random_distances(seed: u64, columns: usize, stray: f64) -> Vec<u16> {
     let mut random = Random::new(seed);
     let mut distances = vec![0; columns * 16];
     for _ in 0..12 {
-        let (from, wide) = (random.below(columns), 1 + random.below(columns / 6));
+        let (from, wide) = (random.below(columns), 1 + random.below(columns.div_ceil(6)));
         let (low, high) = (random.below(16), 1 + random.below(6));
         let near_cm = 120 + random.below(3000);
         for column in (from..from + wide).map(|column| column % columns) {
@@ -182,16 +186,18 @@ proptest! {
     #[test]
     fn random_clouds_are_clustered_as_defined(
         seed in any::<u64>(),
-        columns in 60usize..400,
+        columns in 2usize..400,
         stray in 0.0f64..0.1,
         eps_m in 0.2f64..1.5,
         eps_per_m in 0.0f64..0.05,
         min_points in 1usize..12,
         gap_deg in 0.5f32..9.0,
+        falls in any::<bool>(),
         window_columns in prop::option::of(1usize..8),
     ) {
         let distances = random_distances(seed, columns, stray);
-        let scan = scan_of(&distances, 0.01, 360.0 - gap_deg);
+        let (start_deg, end_deg) = if falls { (215.0, gap_deg - 145.0) } else { (0.01, 360.0 - gap_deg) };
+        let scan = scan_of(&distances, start_deg, end_deg);
         let mut parameters = ClusterParameters::profile(Profile::Default);
         (parameters.eps_m, parameters.eps_per_m) = (eps_m, eps_per_m);
         parameters.min_points = min_points;
@@ -215,6 +221,72 @@ fn a_sweep_that_overlaps_itself_at_the_seam_is_clustered_as_defined() {
     let random = (0..10).map(|seed| random_distances(seed, 360, 0.02));
     for distances in random.chain([twice]) {
         let scan = scan_of(&distances, 0.01, 364.0);
+        assert_is_dbscan(&scan, &vec![false; scan.len()], &parameters);
+    }
+}
+
+#[test]
+fn what_is_exactly_as_far_as_neighbours_can_be_is_one() {
+    let mut parameters = ClusterParameters::profile(Profile::Default);
+    (parameters.min_points, parameters.min_points_far) = (1, 1);
+    parameters.eps_per_m = 0.0;
+    for near_cm in 120..500 {
+        // Two returns to the left and to the right of where azimuths are 180 degrees, and others far
+        // behind, but for straight behind: along x none is between the two.
+        let mut distances = vec![0; 360 * 16];
+        for column in (176..180).chain(181..185) {
+            let is_end = column == 176 || column == 184;
+            let far_cm = 5000 + 700 * (column as u16 % 8);
+            distances[column * 16 + 7] = if is_end { near_cm } else { far_cm };
+        }
+        let scan = scan_of(&distances, 0.0001, 359.0001);
+        let [left_m, right_m] = [176, 184].map(|column| scan.x_m()[scan.index(column, 7)]);
+        parameters.eps_m = f64::from((left_m - right_m).abs());
+        assert_is_dbscan(&scan, &vec![false; scan.len()], &parameters);
+    }
+}
+
+#[test]
+fn of_equally_near_core_points_a_border_point_goes_to_the_first() {
+    let mut parameters = ClusterParameters::profile(Profile::Default);
+    parameters.eps_per_m = 0.0;
+    parameters.min_points_range_m = 100.0;
+    for seed in 0..300 {
+        // All at one range, so that many distances are alike.
+        let mut random = Random::new(seed);
+        let range_cm = 200 + random.below(3000);
+        let is_there = |point: usize| !(40 * 16..140 * 16).contains(&point);
+        let mut distance = |point| match is_there(point) && random.uniform() < 0.35 {
+            true => range_cm as u16,
+            false => 0,
+        };
+        let distances: Vec<u16> = (0..180 * 16).map(&mut distance).collect();
+        parameters.eps_m = 0.00035 * range_cm as f64 * (1.0 + 1.3 * random.uniform());
+        parameters.min_points = 3 + random.below(4);
+        parameters.min_points_far = parameters.min_points;
+        let scan = scan_of(&distances, 0.0001, 358.0001);
+        assert_is_dbscan(&scan, &vec![false; scan.len()], &parameters);
+    }
+}
+
+#[test]
+fn runs_that_lead_away_from_the_sensor_are_joined_as_defined() {
+    let mut parameters = ClusterParameters::profile(Profile::Default);
+    (parameters.min_points, parameters.min_points_far) = (1, 1);
+    parameters.eps_per_m = 0.0;
+    for seed in 0..500 {
+        let mut random = Random::new(seed);
+        parameters.eps_m = 0.3 + 4.0 * random.uniform();
+        let mut distances = vec![0; 360 * 16];
+        for _ in 0..4 + random.below(12) {
+            let (layer, first) = (random.below(16), random.below(360));
+            let mut range_m = 1.0 + 6.0 * random.uniform();
+            for column in first..first + 1 + random.below(30) {
+                distances[column % 360 * 16 + layer] = (100.0 * range_m) as u16;
+                range_m += parameters.eps_m * (0.6 + 0.35 * random.uniform());
+            }
+        }
+        let scan = scan_of(&distances, 0.0001, 359.0001);
         assert_is_dbscan(&scan, &vec![false; scan.len()], &parameters);
     }
 }

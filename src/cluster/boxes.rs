@@ -5,7 +5,6 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use super::ClusterParameters;
-use super::rows::NOT_TAKEN;
 use crate::float::{LANES, greatest, least};
 
 /// A box around points, in space and in range.
@@ -74,8 +73,7 @@ impl Bounds {
     }
 }
 
-/// Many boxes, by their numbers, and behind them as many as one register holds to which nothing is
-/// near.
+/// Many boxes, by their numbers, and behind them as many as one register holds that mean nothing.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Boxes {
     low_m: [Vec<f32>; SPACE],
@@ -95,7 +93,6 @@ impl Boxes {
             metres.resize(count + LANES, 0.0);
         }
         self.eps_squared.resize(count + LANES, 0.0);
-        self.eps_squared[count..].fill(NOT_TAKEN);
         for (number, bounds) in boxes.enumerate() {
             for axis in 0..SPACE {
                 self.low_m[axis][number] = bounds.low_m[axis];
@@ -113,46 +110,44 @@ impl Boxes {
         bounds: &'a Bounds,
         parameters: &ClusterParameters,
     ) -> impl Iterator<Item = usize> + use<'a> {
-        self.find_near(which, bounds, parameters, f32::INFINITY)
+        self.find_near(which, false, bounds, parameters)
     }
 
-    /// The same of boxes that begin in order along x, from one on.
+    /// The same of boxes that begin in order along x, from one on: the others are too far along it.
     pub(super) fn near_in_order<'a>(
         &'a self,
         first: usize,
         bounds: &'a Bounds,
         parameters: &ClusterParameters,
     ) -> impl Iterator<Item = usize> + use<'a> {
-        let last_m = bounds.high_m[0] + bounds.eps_m(parameters);
         let count = self.eps_squared.len().saturating_sub(LANES);
-        self.find_near(first..count, bounds, parameters, last_m)
+        self.find_near(first..count, true, bounds, parameters)
     }
 
     fn find_near<'a>(
         &'a self,
         which: Range<usize>,
+        are_in_order: bool,
         bounds: &'a Bounds,
         parameters: &ClusterParameters,
-        last_m: f32,
     ) -> impl Iterator<Item = usize> + use<'a> {
         let (mut begin, eps_m) = (which.start, bounds.eps_m(parameters));
         std::iter::from_fn(move || {
-            let found = next_near(self, begin..which.end, bounds, eps_m, last_m)?;
+            let found = next_near(self, begin..which.end, are_in_order, bounds, eps_m)?;
             begin = found + 1;
             Some(found)
         })
     }
 }
 
-/// The first of some boxes that is near another one; they are looked at until one begins behind
-/// `last_m` along x.
+/// The first of some boxes that is near another one.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn next_near(
     boxes: &Boxes,
     which: Range<usize>,
+    are_in_order: bool,
     bounds: &Bounds,
     eps_m: f32,
-    last_m: f32,
 ) -> Option<usize> {
     let most = eps_m * eps_m;
     for begin in which.clone().step_by(LANES) {
@@ -170,7 +165,9 @@ fn next_near(
             &boxes.high_m[2][lanes.clone()],
         );
         let eps_squared = &boxes.eps_squared[lanes];
-        if west_m[0] > last_m {
+        // Compared as below: rounding must not part what is exactly as far as neighbours can be.
+        let ahead_m = greatest(west_m[0] - bounds.high_m[0], 0.0);
+        if are_in_order && ahead_m * ahead_m > most {
             return None;
         }
         let apart_m = |axis: usize, low_m: f32, high_m: f32| {

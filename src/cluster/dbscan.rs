@@ -195,7 +195,7 @@ fn neighbours_up_to(needed: u32, centre: &Centre, rows: &Rows, windows: &Windows
     let own = centre.address.layer;
     let cone = Cone::around(centre.range_m, centre.eps_m);
     let (layers, reach) = windows.extent(own, cone);
-    let stretches = windows.stretches(centre.column, reach, reach);
+    let stretches = windows.stretches(centre.column, reach);
     let mut found = 0;
     // Most neighbours are in its own layer, and most of the others above the ground.
     for layer in (own..layers.end).chain((layers.start..own).rev()) {
@@ -217,7 +217,7 @@ fn nearest(centre: &Centre, rows: &Rows, windows: &Windows) -> Option<usize> {
     let mut best = (f32::INFINITY, usize::MAX);
     for layer in layers {
         let row = rows.of(layer);
-        for columns in windows.stretches(centre.column, reach, reach) {
+        for columns in windows.stretches(centre.column, reach) {
             let places = rows.places(layer, &columns);
             let squared = centre.squared_to_nearest(row, places.clone());
             if squared < f32::INFINITY

@@ -4,14 +4,17 @@
 use multiversion::multiversion;
 
 use super::ClusterParameters;
-use super::rows::{Row, Rows};
+use super::rows::{MARGIN, Row, Rows};
 use super::window::Windows;
 use crate::float::{LANES, each, least};
 
-/// Places before and behind in a row that are looked at. With four half as many again would be open.
-const BESIDE: usize = 6;
+/// Places before and behind in a row that are looked at. With six half as many again would be open
+/// in a street, with four three times as many.
+const BESIDE: usize = 8;
 /// What is compared with the returns of one register.
 const COMPARED: usize = LANES + 2 * BESIDE;
+/// No register reaches beyond its row.
+const _: () = assert!(MARGIN >= LANES + BESIDE);
 
 /// Counts the neighbours close by of all returns, themselves included: which of them are core points
 /// for that, and which are open.
@@ -38,7 +41,7 @@ fn count_row<const IS_CLIPPED: bool>(
             return;
         };
         let own = compared.lanes(BESIDE);
-        let mut found = each(|lane| 1.0 + f32::from(row.met(begin + lane)));
+        let mut found = each(|lane| 1.0 + f32::from(row.neighbours_in_column(begin + lane)));
         let needed = each(|lane| parameters.more_than(row.range_m[begin + lane]));
         for apart in 1..=BESIDE {
             let before = own.near::<IS_CLIPPED>(&compared.lanes(BESIDE - apart), most_columns);
@@ -183,7 +186,7 @@ mod tests {
                 let is_inside = (24..56).contains(&row.column(place)) && (4..12).contains(&layer);
                 assert!(row.is_core[place] || !is_inside);
             }
-            assert!(!row.is_core[row.places().end] && !row.is_open[row.places().end]);
+            assert!(!row.is_core[row.places().end]);
         }
         assert!(rows.of(3).is_open[rows.places(3, &(80..81)).start]);
         let corner = rows.places(4, &(20..21)).start;
@@ -208,5 +211,20 @@ mod tests {
             let middle = rows.places(0, &(45..46)).start;
             assert_eq!(rows.of(0).is_core[middle], is_dense, "{columns}");
         }
+    }
+    #[test]
+    fn of_two_returns_the_nearer_one_says_how_far_neighbours_are() {
+        // 0.725 m apart: more than the distance of neighbours at 10 m, and less than that at 10.51 m.
+        let scan = scan_of(2000, |column, layer| match (column, layer) {
+            (200, 3) => 1000,
+            (216, 3) => 1051,
+            _ => 0,
+        });
+        let parameters = ClusterParameters::profile(Profile::Default);
+        let mut windows = Windows::new(&parameters);
+        windows.prepare(&scan);
+        let mut rows = rows_of(&scan, &parameters);
+        count(&mut rows, &windows, &parameters);
+        assert_eq!(rows.of(3).found[MARGIN..MARGIN + 2], [1.0; 2]);
     }
 }

@@ -1,8 +1,11 @@
 //! Which core points belong together.
 
-use super::rows::{Address, Rows};
+use std::ops::Range;
+
+use super::rows::Rows;
 use super::runs::{Core, Runs};
 use super::sets::Sets;
+use crate::cloud::MAX_LAYERS;
 use crate::partition::Partition;
 
 /// Joins core points that are neighbours. Its buffers are made once.
@@ -43,9 +46,15 @@ impl Joiner {
     fn join_along_rows(&mut self, core: &Core<'_>) {
         let runs = self.runs.all();
         for (number, run) in runs.iter().enumerate() {
+            let (row, begin) = (core.rows.of(run.layer()), run.places().start);
             for before in (number.saturating_sub(BEFORE)..number).rev() {
-                let (end, begin) = (runs[before].last(), run.first());
-                if end.layer == begin.layer && core.are_neighbours(end, begin) {
+                let end = runs[before].places().end - 1;
+                if runs[before].layer() == run.layer()
+                    && row.are_neighbours(end, begin)
+                    && core
+                        .windows
+                        .are_in_reach(row.column(end), row.column(begin))
+                {
                     self.partition.join(before as u32, number as u32);
                     break;
                 }
@@ -55,25 +64,24 @@ impl Joiner {
 
     /// Joins the runs that have neighbours in one column of layers that follow each other.
     fn join_along_columns(&mut self, rows: &Rows) {
-        let of_points = self.runs.of_points(rows.points());
-        for (number, run) in self.runs.all().iter().enumerate() {
-            let Address { layer, mut place } = run.first();
-            let row = rows.of(layer);
-            while place <= run.last().place {
-                let above = of_points.get(rows.point(Address { layer, place }) + 1);
-                let above = above.filter(|above| row.meets_above(place) && **above != Runs::NONE);
-                place = match above {
-                    None => place + 1,
-                    Some(above) => {
-                        self.partition.join(number as u32, u32::from(*above));
-                        // All that the run above goes on beside is joined with it now.
-                        let Address {
-                            layer: above,
-                            place,
-                        } = self.runs.all()[usize::from(*above)].last();
-                        rows.first_behind(layer, rows.of(above).column(place))
-                    }
-                };
+        let (runs, of_points) = (self.runs.all(), self.runs.of_points(rows.points()));
+        for (number, run) in runs.iter().enumerate() {
+            let (layer, row) = (run.layer(), rows.of(run.layer()));
+            let Range { mut start, end } = run.places();
+            while start < end {
+                if !row.meets_above(start) {
+                    start += 1;
+                    continue;
+                }
+                let above = of_points[row.column(start) * MAX_LAYERS + layer + 1];
+                start += 1;
+                if above != Runs::NONE {
+                    self.partition.join(number as u32, u32::from(above));
+                    // As far as the run above goes on, it has the returns above all of them.
+                    let above = &runs[usize::from(above)];
+                    let last = rows.of(above.layer()).column(above.places().end - 1);
+                    start = rows.first_behind(layer, last);
+                }
             }
         }
     }

@@ -72,13 +72,20 @@ impl Row {
 
     /// How many of the returns directly above and below one in its column are neighbours.
     #[inline(always)]
-    pub(super) fn met(&self, place: usize) -> u8 {
+    pub(super) fn neighbours_in_column(&self, place: usize) -> u8 {
         self.met[place] % BELOW + self.met[place] / BELOW
     }
 
     /// Whether that directly above one is.
     pub(super) fn meets_above(&self, place: usize) -> bool {
         self.met[place] & ABOVE > 0
+    }
+
+    /// Whether two of its returns are neighbours.
+    #[inline(always)]
+    pub(super) fn are_neighbours(&self, a: usize, b: usize) -> bool {
+        let most = least(self.eps_squared[a], self.eps_squared[b]);
+        squared_distance(self.position_m(a), self.position_m(b)) <= most
     }
 
     /// Where a return is.
@@ -129,8 +136,7 @@ impl Rows {
             find_eps(row, parameters);
             let behind = row.end..row.end + MARGIN;
             row.eps_squared[behind.clone()].fill(NOT_TAKEN);
-            row.is_core[behind.clone()].fill(false);
-            row.is_open[behind].fill(false);
+            row.is_core[behind].fill(false);
         }
     }
 
@@ -174,14 +180,6 @@ impl Rows {
     /// The point of the array that stands somewhere.
     pub(super) fn point(&self, address: Address) -> usize {
         self.rows[address.layer].column(address.place) * MAX_LAYERS + address.layer
-    }
-
-    /// Whether two returns are neighbours.
-    #[inline(always)]
-    pub(super) fn are_neighbours(&self, a: Address, b: Address) -> bool {
-        let (row, other) = (&self.rows[a.layer], &self.rows[b.layer]);
-        let most = least(row.eps_squared[a.place], other.eps_squared[b.place]);
-        squared_distance(row.position_m(a.place), other.position_m(b.place)) <= most
     }
 }
 
@@ -234,6 +232,7 @@ impl<'a> Points<'a> {
     }
 
     /// Some of the columns.
+    #[inline(always)]
     fn part(&self, columns: &Range<usize>) -> Self {
         Self {
             x_m: &self.x_m[columns.clone()],
@@ -395,12 +394,46 @@ pub(super) mod tests {
         let meets = |layer: usize| {
             let row = rows.of(layer);
             let place = row.places().find(|place| row.column(*place) == 35).unwrap();
-            (row.met(place), row.meets_above(place))
+            (row.neighbours_in_column(place), row.meets_above(place))
         };
         assert_eq!(
             [3, 4, 5, 6].map(meets),
             [(1, true), (2, true), (1, false), (0, false)]
         );
         assert_eq!([8, 10, 15].map(meets), [(0, false); 3]);
+    }
+    #[test]
+    fn of_two_returns_the_nearer_one_says_how_far_neighbours_are() {
+        let parameters = ClusterParameters::profile(Profile::Default);
+        // Neighbours are within 0.720 m at 10 m, and within 0.734 m at 10.63 m.
+        let scan = scan_of(2000, |column, layer| match (column, layer) {
+            (100, 3) | (200, 3) => 1000,
+            (100, 4) => 1063,
+            (216, 3) => 1051,
+            _ => 0,
+        });
+        let rows = rows_of(&scan, &parameters);
+        let (row, above) = (rows.of(3), rows.of(4));
+        let [low, before, behind] = [0, 1, 2].map(|nth| MARGIN + nth);
+        for (apart_squared, far, near) in [
+            (
+                squared_distance(row.position_m(low), above.position_m(MARGIN)),
+                above,
+                row,
+            ),
+            (
+                squared_distance(row.position_m(before), row.position_m(behind)),
+                row,
+                row,
+            ),
+        ] {
+            let eps = [near.eps_squared[low], far.eps_squared[far.places().end - 1]];
+            assert!(
+                eps[0] < apart_squared && apart_squared < eps[1],
+                "{apart_squared} {eps:?}"
+            );
+        }
+        assert!(!row.meets_above(low));
+        assert!(!row.are_neighbours(before, behind));
     }
 }

@@ -22,14 +22,6 @@ pub(super) struct Core<'a> {
     pub(super) rows: &'a Rows,
 }
 
-impl Core<'_> {
-    /// Whether two core points are neighbours.
-    pub(super) fn are_neighbours(&self, a: Address, b: Address) -> bool {
-        let column = |address: Address| self.rows.of(address.layer).column(address.place);
-        self.rows.are_neighbours(a, b) && self.windows.are_in_reach(column(a), column(b))
-    }
-}
-
 /// Core points of one layer that follow each other, each a neighbour of the one before.
 #[derive(Debug, Clone)]
 pub(super) struct Run {
@@ -41,7 +33,7 @@ pub(super) struct Run {
 
 impl Run {
     /// Its layer.
-    fn layer(&self) -> usize {
+    pub(super) fn layer(&self) -> usize {
         usize::from(self.layer)
     }
 
@@ -55,14 +47,6 @@ impl Run {
         Address {
             layer: self.layer(),
             place: usize::from(self.places.start),
-        }
-    }
-
-    /// Where its last point stands.
-    pub(super) fn last(&self) -> Address {
-        Address {
-            layer: self.layer(),
-            place: usize::from(self.places.end) - 1,
         }
     }
 
@@ -100,7 +84,7 @@ fn touch(short: &Run, long: &Run, core: &Core<'_>) -> bool {
             place,
         };
         let centre = Centre::of(rows, address, parameters);
-        for columns in windows.stretches(centre.column, reach, reach) {
+        for columns in windows.stretches(centre.column, reach) {
             let places = overlap(&rows.places(long.layer(), &columns), &long.places());
             if centre.has_any(other, places) {
                 return true;
@@ -155,7 +139,7 @@ impl Runs {
     pub(super) fn find(&mut self, rows: &Rows, windows: &Windows) {
         let most_columns = windows.most_columns().unwrap_or(MAX_COLUMNS) as u16;
         self.runs.clear();
-        self.of.fill(Self::NONE);
+        self.of[..rows.points()].fill(Self::NONE);
         for (layer, row) in rows.all().iter().enumerate() {
             mark_edges(row, most_columns, &mut self.edges);
             let mut begin = None;

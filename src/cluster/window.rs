@@ -155,14 +155,14 @@ impl Windows {
         self.most_columns().is_none_or(|most| apart <= most)
     }
 
-    /// The columns from `reach` before to `after` behind a column, over the seam at 0: at
-    /// most two stretches, the second one often empty.
-    pub(super) fn stretches(&self, column: usize, reach: usize, after: usize) -> [Range<usize>; 2] {
+    /// The columns up to `reach` before and behind a column, over the seam at 0: at most two
+    /// stretches, the second one often empty.
+    pub(super) fn stretches(&self, column: usize, reach: usize) -> [Range<usize>; 2] {
         let columns = self.columns;
-        if reach + after + 1 >= columns {
+        if 2 * reach + 1 >= columns {
             return [0..columns, 0..0];
         }
-        let (low, high) = (column + columns - reach, column + columns + after + 1);
+        let (low, high) = (column + columns - reach, column + columns + reach + 1);
         if low >= columns && high > 2 * columns {
             [low - columns..columns, 0..high - 2 * columns]
         } else if low < columns {
@@ -188,11 +188,11 @@ mod tests {
     #[test]
     fn the_seam_is_no_edge() {
         let windows = windows(100, Profile::Default);
-        assert_eq!(windows.stretches(50, 3, 2), [47..53, 0..0]);
-        assert_eq!(windows.stretches(1, 3, 3), [98..100, 0..5]);
-        assert_eq!(windows.stretches(98, 3, 3), [95..100, 0..2]);
-        assert_eq!(windows.stretches(99, 0, 0), [99..100, 0..0]);
-        assert_eq!(windows.stretches(5, 50, 50), [0..100, 0..0]);
+        assert_eq!(windows.stretches(50, 3), [47..54, 0..0]);
+        assert_eq!(windows.stretches(1, 3), [98..100, 0..5]);
+        assert_eq!(windows.stretches(98, 3), [95..100, 0..2]);
+        assert_eq!(windows.stretches(99, 0), [99..100, 0..0]);
+        assert_eq!(windows.stretches(5, 50), [0..100, 0..0]);
     }
 
     #[test]
@@ -214,6 +214,6 @@ mod tests {
         let windows = windows(1800, Profile::Thesis);
         let extent = windows.extent(3, Cone::around(20.0, 1.8));
         assert_eq!(extent, (0..16, 2));
-        assert_eq!(windows.stretches(100, 2, 2)[0].len() * 16, 80);
+        assert_eq!(windows.stretches(100, 2)[0].len() * 16, 80);
     }
 }
