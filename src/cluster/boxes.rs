@@ -183,8 +183,8 @@ fn next_near(
             excess[lane] = squared - least(most, eps_squared[lane]);
         }
         let mut is_any = false;
-        for excess in excess {
-            is_any |= excess <= 0.0;
+        for lane_excess in excess {
+            is_any |= lane_excess <= 0.0;
         }
         if is_any {
             let first = excess.iter().position(|excess| *excess <= 0.0);

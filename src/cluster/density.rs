@@ -212,6 +212,7 @@ mod tests {
             assert_eq!(rows.of(0).is_core[middle], is_dense, "{columns}");
         }
     }
+
     #[test]
     fn of_two_returns_the_nearer_one_says_how_far_neighbours_are() {
         // 0.725 m apart: more than the distance of neighbours at 10 m, and less than that at 10.51 m.

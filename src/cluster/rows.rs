@@ -402,6 +402,7 @@ pub(super) mod tests {
         );
         assert_eq!([8, 10, 15].map(meets), [(0, false); 3]);
     }
+
     #[test]
     fn of_two_returns_the_nearer_one_says_how_far_neighbours_are() {
         let parameters = ClusterParameters::profile(Profile::Default);

@@ -86,7 +86,7 @@ fn touch(short: &Run, long: &Run, core: &Core<'_>) -> bool {
         let centre = Centre::of(rows, address, parameters);
         for columns in windows.stretches(centre.column, reach) {
             let places = overlap(&rows.places(long.layer(), &columns), &long.places());
-            if centre.has_any(other, places) {
+            if centre.count(other, places) > 0 {
                 return true;
             }
         }

@@ -58,22 +58,6 @@ impl Centre {
         found as u32
     }
 
-    /// Whether any of some places of a row is its neighbour.
-    #[inline(always)]
-    pub(super) fn has_any(&self, row: &Row, places: Range<usize>) -> bool {
-        for begin in places.clone().step_by(LANES) {
-            let (squared, most) = self.compared(row, begin, places.end);
-            let mut is_near = false;
-            for lane in 0..LANES {
-                is_near |= squared[lane] <= most[lane];
-            }
-            if is_near {
-                return true;
-            }
-        }
-        false
-    }
-
     /// Squared distance to the nearest neighbour at some places of a row; infinity if there is none.
     #[inline(always)]
     pub(super) fn squared_to_nearest(&self, row: &Row, places: Range<usize>) -> f32 {
@@ -176,10 +160,6 @@ mod tests {
             assert_eq!(
                 centre.count(row, places.clone()),
                 near.clone().count() as u32
-            );
-            assert_eq!(
-                centre.has_any(row, places.clone()),
-                near.clone().count() > 0
             );
             let nearest = near.min_by(|a, b| squared_to(a).total_cmp(&squared_to(b)));
             let squared = nearest.as_ref().map_or(f32::INFINITY, squared_to);
