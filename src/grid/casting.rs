@@ -1,7 +1,7 @@
 //! Draws the ways of a revolution's rays into the window.
 
 use super::evidence::Stretch;
-use super::window::Window;
+use super::window::{Window, cell_of};
 use crate::cloud::Scan;
 use crate::ego::Placement;
 
@@ -35,6 +35,30 @@ impl Border {
     }
 }
 
+/// Where the first stretch of a column ends at one of its borders.
+#[derive(Debug, Clone, Copy)]
+struct Corner {
+    at: [f64; 2],
+    cell: [i64; 2],
+}
+
+impl Corner {
+    fn at(at: [f64; 2]) -> Self {
+        Self {
+            at,
+            cell: at.map(cell_of),
+        }
+    }
+}
+
+/// Goes on with the outline from one corner to the next. Within a cell there is nothing to do: the
+/// line that came to it has passed it.
+fn connect(from: Corner, to: Corner, window: &mut Window) {
+    if from.cell != to.cell {
+        window.outline(from.at, to.at);
+    }
+}
+
 impl Casting {
     /// Marks the cells that rays passed on these stretches. They come by column, each column's
     /// first begins at the sensor, and the others do not meet it or each other.
@@ -58,12 +82,22 @@ impl Casting {
                 continue;
             };
             let ends = [first.column, last.column + 1];
-            let mut before: &[Stretch] = &[];
+            let (mut before, mut reached): (&[Stretch], _) = (&[], None);
             for now in half.chunk_by(|a, b| a.column == b.column) {
                 let column = now[0].column;
-                self.outline_between(column, before, now, window);
-                self.outline_across(column, now, window);
-                before = now;
+                let [left, right] = [column, column + 1].map(|border| {
+                    let at = self.borders[border].at(now[0].to_m);
+                    Corner::at(at)
+                });
+                match reached {
+                    Some(reached) if before.len() == 1 && now.len() == 1 => {
+                        connect(reached, left, window);
+                    }
+                    _ => self.outline_between(column, before, now, window),
+                }
+                connect(left, right, window);
+                self.outline_across(column, &now[1..], window);
+                (before, reached) = (now, Some(right));
             }
             self.outline_between(ends[1], before, &[], window);
             let [begin, end] = ends.map(|border| self.borders[border].origin);
@@ -94,14 +128,13 @@ impl Casting {
             .extend(columns.checked_sub(1).map(|last| border(last, aside)));
     }
 
-    /// Where a column's stretches begin, but at the sensor, and where they end.
+    /// Where a column's stretches but the first begin, and where they end.
     fn outline_across(&self, column: usize, stretches: &[Stretch], window: &mut Window) {
         let [left, right] = [0, 1].map(|side| self.borders[column + side]);
-        for (place, stretch) in stretches.iter().enumerate() {
-            if place > 0 {
-                window.outline(left.at(stretch.from_m), right.at(stretch.from_m));
+        for stretch in stretches {
+            for metres in [stretch.from_m, stretch.to_m] {
+                window.outline(left.at(metres), right.at(metres));
             }
-            window.outline(left.at(stretch.to_m), right.at(stretch.to_m));
         }
     }
 
@@ -115,10 +148,6 @@ impl Casting {
         window: &mut Window,
     ) {
         let line = self.borders[border];
-        if let ([left], [right]) = (left, right) {
-            window.outline(line.at(left.to_m), line.at(right.to_m));
-            return;
-        }
         self.ends_m.clear();
         for stretch in left.iter().chain(right) {
             self.ends_m.extend([stretch.from_m, stretch.to_m]);

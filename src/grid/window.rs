@@ -208,6 +208,11 @@ fn fixed(cells: f64) -> i64 {
     fractions.to_bits().wrapping_sub(ONES.to_bits()) as i64
 }
 
+/// The row or the column of a place.
+pub(super) fn cell_of(cells: f64) -> i64 {
+    fixed(cells) >> FRACTION_BITS
+}
+
 /// An outline crosses the southern edge of a row, if it does so before the row's end.
 #[inline(always)]
 fn cross_row(row: &mut [u64], x: i64) {
