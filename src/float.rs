@@ -53,16 +53,15 @@ pub(crate) fn greatest_of<const N: usize>(values: [f32; N]) -> f32 {
 /// The least and the greatest of many numbers, of which none is NaN; infinities of none.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 pub(crate) fn bounds_of(values: &[f32]) -> [f32; 2] {
-    let (pairs, rest) = values.as_chunks::<{ 2 * LANES }>();
-    let mut low = [[f32::INFINITY; LANES]; 2];
-    let mut high = [[f32::NEG_INFINITY; LANES]; 2];
-    for pair in pairs {
-        let (halves, _) = pair.as_chunks();
-        low = [0, 1].map(|half| least_each(low[half], halves[half]));
-        high = [0, 1].map(|half| greatest_each(high[half], halves[half]));
+    let (eights, rest) = values.as_chunks::<LANES>();
+    let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+    for eight in eights {
+        low = least_each(*eight, low);
     }
-    let (low, high) = (low.map(least_of), high.map(greatest_of));
-    let mut bounds = [least(low[0], low[1]), greatest(high[0], high[1])];
+    for eight in eights {
+        high = greatest_each(*eight, high);
+    }
+    let mut bounds = [least_of(low), greatest_of(high)];
     for value in rest {
         bounds = [least(bounds[0], *value), greatest(bounds[1], *value)];
     }

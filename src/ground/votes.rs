@@ -4,7 +4,7 @@ use multiversion::multiversion;
 
 use super::surface::Ring;
 use crate::cloud::MAX_LAYERS;
-use crate::float::{LANES, each};
+use crate::float::{LANES, each, greatest_each, least_each};
 
 /// Sectors to either side that vote on a level.
 pub(super) const VOTERS: usize = 3;
@@ -58,27 +58,31 @@ fn elected_of_half(voters: [&[Ring; LANES]; ALL]) -> [Ring; LANES] {
     })
 }
 
-/// The median of as many levels of each layer as there are votes; the others are infinite. At most
-/// half of the votes are below it, and more than half are not above: of two in the middle it is the
-/// upper one. Without votes it is infinite.
+/// The median of as many levels of each layer as there are votes; the others are infinite. Of two in
+/// the middle it is the upper one. Without votes it is infinite.
 #[inline(always)]
 fn median_of(levels_m: &[[f32; LANES]; ALL], votes: [f32; LANES]) -> [f32; LANES] {
-    let mut median_m = levels_m[0];
+    // The lower half of them, lowest first.
+    let mut sorted_m = [[f32::INFINITY; LANES]; VOTERS + 1];
     for level_m in levels_m {
-        let (mut below, mut not_above) = ([0.0; LANES], [0.0; LANES]);
-        for other_m in levels_m {
-            below = each(|lane| below[lane] + f32::from(other_m[lane] < level_m[lane]));
-            not_above = each(|lane| not_above[lane] + f32::from(other_m[lane] <= level_m[lane]));
+        let mut level_m = *level_m;
+        for sorted_m in &mut sorted_m {
+            let lower_m = least_each(*sorted_m, level_m);
+            level_m = greatest_each(*sorted_m, level_m);
+            *sorted_m = lower_m;
         }
-        median_m = each(|lane| {
-            let half = 0.5 * votes[lane];
-            let is_median = (below[lane] <= half) & (half < not_above[lane]);
-            if is_median {
-                level_m[lane]
+    }
+    let mut median_m = sorted_m[0];
+    for (below, sorted_m) in sorted_m.iter().enumerate().skip(1) {
+        let least_votes = 2.0 * below as f32;
+        for lane in 0..LANES {
+            let is_lower = votes[lane] >= least_votes;
+            median_m[lane] = if is_lower {
+                sorted_m[lane]
             } else {
                 median_m[lane]
-            }
-        });
+            };
+        }
     }
     median_m
 }

@@ -39,6 +39,8 @@ mod nearest;
 
 mod objects;
 
+mod parting;
+
 mod patches;
 
 mod people;

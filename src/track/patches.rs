@@ -1,12 +1,10 @@
 //! Returns of one revolution that may be road users, placed, cluster by cluster and part by part.
 
-use super::floor::Floor;
-use super::look::SAME_M;
+use super::parting::{CUT_M, Parting};
 use super::placing::{Bounds, Placed, Placing};
 use super::{Scene, TrackParameters, people};
-use crate::cloud::MAX_LAYERS;
 use crate::cluster::Clusters;
-use crate::float::{bounds_of, greatest};
+use crate::float::greatest;
 
 /// A cluster, or a part of one.
 #[derive(Debug, Clone, Copy)]
@@ -54,68 +52,12 @@ pub(super) struct Placer {
     cluster: Placing,
     placed: Vec<Placed>,
     patches: Vec<Patch>,
-    floor: Floor,
-    /// Where on it each return lies.
-    places: Vec<u32>,
-    /// Whether there is more above each cell, by [`Floor::number`]: the first one is that of all
-    /// that lies in no cell.
-    covered: Vec<bool>,
-    /// That of what belongs to none, and all others.
-    parts: Vec<Part>,
-    /// The part of each return.
-    part_of: Vec<u32>,
+    parting: Parting,
     /// The patches before people were told apart, and where one of them is cut.
     former: Vec<Patch>,
     cuts: Vec<usize>,
 }
 
-/// Cells of a cluster that touch.
-#[derive(Debug, Clone, Copy)]
-struct Part {
-    /// Cells, and those above which there is more.
-    cells: u32,
-    covered: u32,
-    /// What is higher does not belong to it, but for the roof of a van.
-    cut_m: f32,
-    /// Where its returns begin; later where they end.
-    place: usize,
-}
-
-impl Part {
-    /// That of nothing.
-    const EMPTY: Self = Self {
-        cells: 0,
-        covered: 0,
-        cut_m: f32::NEG_INFINITY,
-        place: 0,
-    };
-
-    /// Whether it is a wall or a trunk.
-    fn goes_on(&self) -> bool {
-        f64::from(self.covered) >= GOES_ON * f64::from(self.cells)
-    }
-}
-
-/// The part of what belongs to none.
-const NO_PART: u32 = 0;
-/// Side of the cells of which a part consists: surfaces of one body are closer to each other,
-/// seen from above, and people are farther from the hedge that they pass.
-const CELL_M: f32 = 0.3;
-/// What is added to it for each metre of range beyond the first.
-const CELL_PER_M: f32 = 0.012;
-const NEAR_M: f32 = 12.0;
-/// What is higher is cut off what may stand below it: crowns of trees, roofs.
-const CUT_M: f32 = 2.1;
-/// What is lower joins no parts: grass, kerbs, and what is left of the ground.
-const LOW_M: f32 = 0.2;
-/// How far up a wall is looked for, at least and for each metre of range: three layers.
-const ABOVE_CUT_M: f32 = 0.8;
-const ABOVE_CUT_PER_M: f32 = 0.07;
-/// Share of a part's cells above which there is more, from which on it is a wall or a trunk.
-const GOES_ON: f64 = 0.5;
-/// Greatest height of vans: what is above the cut and goes on from below belongs to what is below if
-/// the whole cluster is lower.
-const VAN_TOP_M: f32 = 3.0;
 /// Smaller clusters are not divided.
 const SMALLEST_DIVIDED_M: f64 = 1.0;
 
@@ -207,126 +149,23 @@ impl Placer {
         &self.placed[patch.begin..patch.end]
     }
 
-    /// Adds the parts of the cluster, one after the other and each in the order of the scan. What is
-    /// above the cut belongs to a part that goes on there, unless all of it is too tall.
+    /// Adds the parts of the cluster, one after the other and each in the order of the scan.
     fn divide(&mut self, whole: &Bounds, is_too_tall: bool) {
-        let [nearest_m, _] = bounds_of(self.cluster.range_m());
-        let cell_m = CELL_M + CELL_PER_M * greatest(nearest_m - NEAR_M, 0.0);
-        self.floor
-            .begin(whole.low_m, whole.high_m, cell_m, self.origin_m);
-        self.floor
-            .find_places(self.cluster.at_m(), &mut self.places);
-        let places = self.places.iter().zip(self.cluster.above_m());
-        self.floor
-            .add(places.map(|(place, above_m)| (*place, is_at_body_height(*above_m))));
-        self.floor.join();
-        self.count_cells(is_too_tall, whole.top_m);
-        self.assign(whole.top_m);
-        self.sort(is_too_tall);
-    }
-
-    /// Counts the cells of every part, and those above which there is more, close to the cut.
-    fn count_cells(&mut self, is_too_tall: bool, top_m: f32) {
-        let cells = self.floor.len();
-        self.covered.clear();
-        self.covered.resize(1 + cells, false);
-        if top_m > CUT_M {
-            let heights_m = self.cluster.above_m().iter();
-            let others = self.cluster.range_m().iter().zip(&self.places);
-            for (above_m, (range_m, place)) in heights_m.zip(others) {
-                let most_m = CUT_M + greatest(ABOVE_CUT_M, ABOVE_CUT_PER_M * range_m);
-                let cell = self.floor.number(*place) as usize;
-                self.covered[cell] |= (*above_m > CUT_M) & (*above_m < most_m);
-            }
-        }
-        self.parts.clear();
-        self.parts.resize(1 + cells, Part::EMPTY);
-        for (part, is_covered) in self.floor.parts().iter().zip(&self.covered[1..]) {
-            let part = &mut self.parts[1 + *part as usize];
-            part.cells += 1;
-            part.covered += u32::from(*is_covered);
-        }
-        for part in &mut self.parts[1..] {
-            let has_upper = !is_too_tall && part.goes_on();
-            part.cut_m = if has_upper { f32::INFINITY } else { CUT_M };
-        }
-    }
-
-    /// Finds the part of every return, and where each part's returns begin.
-    fn assign(&mut self, top_m: f32) {
-        self.floor.name_by_parts();
-        self.part_of.clear();
-        let own = self.places.iter().zip(self.cluster.above_m());
-        self.part_of.extend(own.map(|(place, above_m)| {
-            let number = self.floor.number(*place);
-            let is_its = *above_m <= self.parts[number as usize].cut_m;
-            if is_its { number } else { NO_PART }
-        }));
-        // Of what is lower nothing is above the cut, and what is higher is no van.
-        if (CUT_M..VAN_TOP_M).contains(&top_m) {
-            self.assign_roofs();
-        }
-        for part in &self.part_of {
-            self.parts[*part as usize].place += 1;
-        }
-        let mut next = self.placed.len();
-        for part in &mut self.parts[1..] {
-            next += std::mem::replace(&mut part.place, next);
-        }
-        // What belongs to none goes behind all others, again and again to the same place.
-        self.parts[NO_PART as usize].place = next;
-        self.placed.resize(next + 1, Placed::default());
-    }
-
-    /// Gives what is above the cut, and goes on from the return below, the part of that.
-    fn assign_roofs(&mut self) {
-        let (above_m, range_m) = (self.cluster.above_m(), self.cluster.range_m());
-        let points = self.cluster.points();
-        for place in 1..points.len() {
-            if self.part_of[place] == NO_PART
-                && above_m[place] > CUT_M
-                && is_below(points[place - 1], points[place])
-                && (range_m[place] - range_m[place - 1]).abs() < SAME_M
-            {
-                self.part_of[place] = self.part_of[place - 1];
-            }
-        }
-    }
-
-    /// Puts the returns of every part side by side, and makes the parts patches.
-    fn sort(&mut self, is_too_tall: bool) {
-        for (placed, part) in self.cluster.iter().zip(&self.part_of) {
-            let place = &mut self.parts[*part as usize].place;
-            self.placed[*place] = placed;
-            *place += usize::from(*part != NO_PART);
-        }
-        self.placed.pop();
-        // Each part now ends where the next one begins.
-        for part in &self.parts[1..] {
-            let begin = self.patches.last().map_or(0, |patch| patch.end);
-            if part.place > begin {
+        let cluster = &self.cluster;
+        self.parting
+            .divide(cluster, whole, is_too_tall, self.origin_m);
+        self.parting
+            .put(cluster, &mut self.placed, |own, bounds, goes_on| {
                 self.patches.push(Patch {
-                    begin,
-                    end: part.place,
-                    bounds: Bounds::of(&self.placed[begin..part.place]),
-                    goes_on: is_too_tall && part.goes_on(),
+                    begin: own.start,
+                    end: own.end,
+                    bounds,
+                    goes_on: is_too_tall && goes_on,
                     is_suspect: false,
                     beside: [0; 2],
                 });
-            }
-        }
+            });
     }
-}
-
-/// Whether a point is the next one below another in its column.
-fn is_below(below: u32, point: u32) -> bool {
-    !point.is_multiple_of(MAX_LAYERS as u32) && below + 1 == point
-}
-
-/// Whether a return may be a road user's below the height at which trees and roofs are cut off,
-/// and above that of grass.
-fn is_at_body_height(above_m: f32) -> bool {
-    (LOW_M..=CUT_M).contains(&above_m)
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! The returns of one cluster, placed, coordinate by coordinate.
 
+use std::ops::Range;
+
 use super::look::same_above;
 use super::{Scene, seam};
 use crate::cloud::MAX_LAYERS;
@@ -63,23 +65,32 @@ impl Bounds {
         [0, 1].map(|axis| 0.5 * (self.low_m[axis] + self.high_m[axis]))
     }
 
+    /// That of no returns.
+    pub(super) const NOTHING: Self = Self {
+        low_m: [f32::INFINITY; 2],
+        high_m: [f32::NEG_INFINITY; 2],
+        floor_m: f32::INFINITY,
+        top_m: f32::NEG_INFINITY,
+    };
+
     /// The box that holds some returns.
     pub(super) fn of(returns: &[Placed]) -> Self {
-        let mut bounds = Self {
-            low_m: [f32::INFINITY; 2],
-            high_m: [f32::NEG_INFINITY; 2],
-            floor_m: f32::INFINITY,
-            top_m: f32::NEG_INFINITY,
-        };
-        for Placed { at_m, above_m, .. } in returns {
-            for (axis, metres) in at_m.iter().enumerate() {
-                bounds.low_m[axis] = least(bounds.low_m[axis], *metres);
-                bounds.high_m[axis] = greatest(bounds.high_m[axis], *metres);
-            }
-            bounds.floor_m = least(bounds.floor_m, *above_m);
-            bounds.top_m = greatest(bounds.top_m, *above_m);
+        let mut bounds = Self::NOTHING;
+        for placed in returns {
+            bounds.extend(placed);
         }
         bounds
+    }
+
+    /// Makes it hold a further return.
+    #[inline(always)]
+    pub(super) fn extend(&mut self, Placed { at_m, above_m, .. }: &Placed) {
+        for (axis, metres) in at_m.iter().enumerate() {
+            self.low_m[axis] = least(self.low_m[axis], *metres);
+            self.high_m[axis] = greatest(self.high_m[axis], *metres);
+        }
+        self.floor_m = least(self.floor_m, *above_m);
+        self.top_m = greatest(self.top_m, *above_m);
     }
 }
 
@@ -184,15 +195,20 @@ impl Placing {
 
     /// All of them.
     pub(super) fn iter(&self) -> impl Iterator<Item = Placed> {
-        let [x_m, y_m] = self.at_m();
-        let places = x_m.iter().zip(y_m);
-        let others = self.above_m().iter().zip(&self.point);
-        let all = places.zip(others).enumerate();
-        all.map(|(place, ((x, y), (above_m, point)))| Placed {
-            at_m: [*x, *y],
-            above_m: *above_m,
-            point: *point,
-            is_brought: place < self.brought,
+        self.stretch(0..self.count)
+    }
+
+    /// Some that follow each other.
+    #[inline(always)]
+    pub(super) fn stretch(&self, places: Range<usize>) -> impl Iterator<Item = Placed> {
+        let (x_m, y_m) = (&self.x_m[places.clone()], &self.y_m[places.clone()]);
+        let (above_m, point) = (&self.above_m[places.clone()], &self.point[places.clone()]);
+        let (begin, count) = (places.start, places.len());
+        (0..count).map(move |at| Placed {
+            at_m: [x_m[at], y_m[at]],
+            above_m: above_m[at],
+            point: point[at],
+            is_brought: begin + at < self.brought,
         })
     }
 
