@@ -1,10 +1,12 @@
 //! What is seen of an object in one revolution, whatever it is.
 
+use std::ops::RangeInclusive;
+
 use nalgebra::Vector2;
 
-use super::spots::{Spot, bounds_m};
+use super::spots::Spot;
 use crate::cloud::{MAX_LAYERS, Scan};
-use crate::float::least;
+use crate::float::{greatest, least};
 
 /// Everything that is measured of a group without knowing the object.
 #[derive(Debug, Clone, Copy)]
@@ -68,6 +70,7 @@ impl Look {
     pub(super) fn at(spots: &[Spot], scan: &Scan, sensor_m: Vector2<f64>) -> Self {
         let count = spots.len() as f64;
         let (mut sum_m, mut age_s, mut low) = ([0.0; 2], 0.0, 0u32);
+        let (mut lowest_layer, mut highest_layer) = (MAX_LAYERS, 0);
         let (mut floor_m, mut top_m, mut top_point) = (f32::INFINITY, f32::NEG_INFINITY, 0);
         for spot in spots {
             for (sum_m, metres) in sum_m.iter_mut().zip(spot.at_m) {
@@ -76,6 +79,9 @@ impl Look {
             age_s += f64::from(spot.age_s);
             low += u32::from(spot.above_m <= BELT_M);
             floor_m = least(floor_m, spot.above_m);
+            let layer = scan.layer(spot.point as usize);
+            lowest_layer = lowest_layer.min(layer);
+            highest_layer = highest_layer.max(layer);
             if spot.above_m > top_m {
                 (top_m, top_point) = (spot.above_m, spot.point as usize);
             }
@@ -91,8 +97,10 @@ impl Look {
             f64::MAX
         };
         let upper_m = extent_m(spots, |above_m| above_m > UPPER_M, FEWEST_UPPER);
-        let ends = ends(spots, scan);
-        let ends_m = ends.map(|end| sensor_m + Vector2::from(end.at_m).map(f64::from));
+        let columns = Columns::of(spots, scan);
+        let ends_m = columns
+            .ends
+            .map(|end| sensor_m + Vector2::from(end.at_m).map(f64::from));
         Self {
             middle_m,
             age_s: age_s / count,
@@ -105,12 +113,12 @@ impl Look {
                 .filter(|upper_m| *upper_m < SHOULDERS_M)
                 .and_then(|_| extent_m(spots, |above_m| above_m < LOWER_M, FEWEST_LOWER)),
             roughness_m: roughness_m(spots, scan),
-            goes_on: goes_on(spots, scan),
+            goes_on: columns.goes_on(),
             range_m,
-            gap_m: range_m * scan.step_rad().abs() * missed_between(spots, ends, scan),
+            gap_m: range_m * scan.step_rad().abs() * columns.missed_between(scan),
             is_upper: f64::from(low) < (LOW_SHARE * count).max(2.0),
             ends_m,
-            is_cut: cuts(spots, ends, scan),
+            is_cut: cuts(lowest_layer..=highest_layer, columns.ends, scan),
             is_one_of_several: false,
             sensor_m,
             sensor_mps: Vector2::zeros(),
@@ -143,65 +151,75 @@ fn is_covered(scan: &Scan, point: usize) -> bool {
     above_m > 0.0 && f64::from(above_m) < f64::from(scan.range_m()[point]) - OCCLUDER_M
 }
 
-/// Share of a group's columns in which the ray above its topmost return met something at the
-/// same distance.
-fn goes_on(spots: &[Spot], scan: &Scan) -> f64 {
-    let (mut columns, mut on) = (0u32, 0u32);
-    for (number, spot) in spots.iter().enumerate() {
-        let point = spot.point as usize;
-        let is_top = spots
-            .get(number + 1)
-            .is_none_or(|next| scan.column(next.point as usize) != scan.column(point));
-        if is_top && scan.layer(point) + 1 < MAX_LAYERS {
-            columns += 1;
-            on += u32::from(same_above(scan, point).is_some());
-        }
-    }
-    f64::from(on) / f64::from(columns.max(1))
+/// What is seen of a group column by column.
+struct Columns<'a> {
+    /// The leftmost and the rightmost of a group, seen from the sensor, which it does not surround;
+    /// of a column, the lowest.
+    ends: [&'a Spot; 2],
+    /// Columns that met it.
+    met: u32,
+    /// Those whose topmost return is not of the highest layer, and those of them in which the ray
+    /// above that return met something at the same distance.
+    seen_above: u32,
+    going_on: u32,
 }
 
-/// The leftmost and the rightmost of a group, seen from the sensor, which it does not surround; of
-/// a column, the lowest.
-fn ends<'a>(spots: &'a [Spot], scan: &Scan) -> [&'a Spot; 2] {
-    let column_of = |spot: &Spot| scan.column(spot.point as usize);
-    let is_to_left = |of: &Spot, spot: &Spot| {
-        let [of, spot] = [of, spot].map(|end| Vector2::from(end.at_m));
-        of.perp(&spot) > 0.0
-    };
-    let columns = spots.chunk_by(|a, b| column_of(a) == column_of(b));
-    columns.fold([&spots[0]; 2], |[left, right], column| {
-        let lowest = &column[0];
-        [
+impl<'a> Columns<'a> {
+    /// `spots` must not be empty.
+    fn of(spots: &'a [Spot], scan: &Scan) -> Self {
+        let is_to_left = |of: &Spot, spot: &Spot| {
+            let [of, spot] = [of, spot].map(|end| Vector2::from(end.at_m));
+            of.perp(&spot) > 0.0
+        };
+        let mut columns = Self {
+            ends: [&spots[0]; 2],
+            met: 0,
+            seen_above: 0,
+            going_on: 0,
+        };
+        let mut lowest = &spots[0];
+        for (number, spot) in spots.iter().enumerate() {
+            let point = spot.point as usize;
+            let next = spots.get(number + 1);
+            let is_top =
+                next.is_none_or(|next| scan.column(next.point as usize) != scan.column(point));
+            if !is_top {
+                continue;
+            }
+            let [left, right] = &mut columns.ends;
             if is_to_left(left, lowest) {
-                lowest
-            } else {
-                left
-            },
+                *left = lowest;
+            }
             if is_to_left(lowest, right) {
-                lowest
-            } else {
-                right
-            },
-        ]
-    })
+                *right = lowest;
+            }
+            columns.met += 1;
+            if scan.layer(point) + 1 < MAX_LAYERS {
+                columns.seen_above += 1;
+                columns.going_on += u32::from(same_above(scan, point).is_some());
+            }
+            lowest = next.unwrap_or(lowest);
+        }
+        columns
+    }
+
+    /// Share of the columns in which it goes on above.
+    fn goes_on(&self) -> f64 {
+        f64::from(self.going_on) / f64::from(self.seen_above.max(1))
+    }
+
+    /// Columns without a return for each one with a return, from end to end.
+    fn missed_between(&self, scan: &Scan) -> f64 {
+        let [left, right] = self.ends.map(|end| scan.column(end.point as usize));
+        let apart = left.abs_diff(right);
+        let across = apart.min(scan.columns() - apart) + 1;
+        let met = self.met as usize;
+        across.saturating_sub(met) as f64 / met as f64
+    }
 }
 
-/// Columns without a return for each one with a return, from end to end.
-fn missed_between(spots: &[Spot], ends: [&Spot; 2], scan: &Scan) -> f64 {
-    let column_of = |spot: &Spot| scan.column(spot.point as usize);
-    let [left, right] = ends.map(column_of);
-    let apart = left.abs_diff(right);
-    let across = apart.min(scan.columns() - apart) + 1;
-    let met = spots.chunk_by(|a, b| column_of(a) == column_of(b)).count();
-    across.saturating_sub(met) as f64 / met as f64
-}
-
-/// Whether something nearer stands directly to the left and to the right of a group.
-fn cuts(spots: &[Spot], ends: [&Spot; 2], scan: &Scan) -> [bool; 2] {
-    let layers = spots.iter().map(|spot| scan.layer(spot.point as usize));
-    let (low, high) = layers.fold((MAX_LAYERS, 0), |(low, high), layer| {
-        (low.min(layer), high.max(layer))
-    });
+/// Whether something nearer stands directly to the left and to the right of a group, in its layers.
+fn cuts(layers: RangeInclusive<usize>, ends: [&Spot; 2], scan: &Scan) -> [bool; 2] {
     // Azimuths grow clockwise, so that the left is where columns come before.
     let forward = scan.step_rad() > 0.0;
     let directions = [!forward, forward];
@@ -216,7 +234,7 @@ fn cuts(spots: &[Spot], ends: [&Spot; 2], scan: &Scan) -> [bool; 2] {
                 columns - step
             };
             let next = (scan.column(point) + step) % columns;
-            (low..=high).any(|layer| {
+            layers.clone().any(|layer| {
                 let beside_m = scan.range_m()[scan.index(next, layer)];
                 beside_m > 0.0 && f64::from(beside_m) < range_m - OCCLUDER_M
             })
@@ -226,9 +244,15 @@ fn cuts(spots: &[Spot], ends: [&Spot; 2], scan: &Scan) -> [bool; 2] {
 
 /// Diagonal of the returns at some heights, if they are not too few.
 fn extent_m(spots: &[Spot], is_there: impl Fn(f32) -> bool, fewest: usize) -> Option<f64> {
-    let there = spots.iter().filter(|spot| is_there(spot.above_m));
-    (there.clone().count() >= fewest).then(|| {
-        let [low_m, high_m] = bounds_m(there);
+    let (mut count, mut low_m, mut high_m) = (0, [f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+    for spot in spots.iter().filter(|spot| is_there(spot.above_m)) {
+        count += 1;
+        for (axis, metres) in spot.at_m.into_iter().enumerate() {
+            low_m[axis] = least(low_m[axis], metres);
+            high_m[axis] = greatest(high_m[axis], metres);
+        }
+    }
+    (count >= fewest).then(|| {
         let [along_m, across_m] = [0, 1].map(|axis| f64::from(high_m[axis] - low_m[axis]));
         libm::hypot(along_m, across_m)
     })
@@ -304,7 +328,8 @@ mod tests {
         for turn in [0, 35, 50] {
             spots.rotate_left(turn);
             // Azimuths grow clockwise.
-            let ends = ends(&spots, &scan).map(|end| scan.column(end.point as usize));
+            let ends = Columns::of(&spots, &scan).ends;
+            let ends = ends.map(|end| scan.column(end.point as usize));
             assert_eq!(ends, [columns.start, columns.end - 1]);
         }
     }
