@@ -5,14 +5,20 @@ use multiversion::multiversion;
 use super::Outline;
 use super::forecast::Forecasts;
 use super::placing::Placed;
+use crate::float::least;
 
 /// For every return of a patch the track that has it. Its buffers are made once.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Claims {
+    /// Where the returns are.
+    x_m: Vec<f32>,
+    y_m: Vec<f32>,
     /// Distance from the edge of that track's box, negative within.
     distances_m: Vec<f32>,
     /// The number of the track, or [`NOBODY`].
     owners: Vec<u32>,
+    /// Those before the last track.
+    former: Vec<u32>,
 }
 
 const NOBODY: u32 = u32::MAX;
@@ -30,10 +36,18 @@ impl Claims {
         forecasts: &Forecasts,
         is_whole: bool,
     ) {
-        self.distances_m.clear();
-        self.distances_m.resize(placed.len(), f32::INFINITY);
         self.owners.clear();
         self.owners.resize(placed.len(), NOBODY);
+        if near.is_empty() {
+            return;
+        }
+        self.former.resize(placed.len(), NOBODY);
+        self.distances_m.clear();
+        self.distances_m.resize(placed.len(), f32::INFINITY);
+        for (axis, metres) in [&mut self.x_m, &mut self.y_m].into_iter().enumerate() {
+            metres.clear();
+            metres.extend(placed.iter().map(|placed| placed.at_m[axis]));
+        }
         for track in near {
             let forecast = forecasts.of(*track);
             let margin_m = if is_whole {
@@ -41,11 +55,13 @@ impl Claims {
             } else {
                 STRUCTURE_MARGIN_M
             };
+            std::mem::swap(&mut self.owners, &mut self.former);
             claim(
-                placed,
+                (&self.x_m, &self.y_m),
                 (&forecast.outline, forecast.middle_m, margin_m),
                 *track as u32,
-                (&mut self.distances_m, &mut self.owners),
+                &mut self.distances_m,
+                (&self.former, &mut self.owners),
             );
         }
     }
@@ -85,22 +101,29 @@ impl Claims {
 /// Gives a track the returns that lie nearer to its box than to any before.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn claim(
-    placed: &[Placed],
-    (outline, [x_m, y_m], margin_m): (&Outline, [f32; 2], f32),
+    (x_m, y_m): (&[f32], &[f32]),
+    (outline, [middle_x_m, middle_y_m], margin_m): (&Outline, [f32; 2], f32),
     track: u32,
-    (distances_m, owners): (&mut [f32], &mut [u32]),
+    distances_m: &mut [f32],
+    (former, owners): (&[u32], &mut [u32]),
 ) {
-    let (distances_m, owners) = (
-        &mut distances_m[..placed.len()],
-        &mut owners[..placed.len()],
-    );
-    for place in 0..placed.len() {
-        let [x, y] = placed[place].at_m;
-        let distance_m = outline.off_edge_m([x - x_m, y - y_m]);
-        let is_nearer = (distance_m <= margin_m) & (distance_m < distances_m[place]);
-        let (before_m, owner) = (distances_m[place], owners[place]);
-        distances_m[place] = if is_nearer { distance_m } else { before_m };
-        owners[place] = if is_nearer { track } else { owner };
+    let outline = *outline;
+    let count = distances_m.len();
+    let (x_m, y_m) = (&x_m[..count], &y_m[..count]);
+    // Owners that are written where they are read would be stored under a mask, slowly.
+    let (former, owners) = (&former[..count], &mut owners[..count]);
+    for place in 0..count {
+        let at_m = [x_m[place] - middle_x_m, y_m[place] - middle_y_m];
+        let distance_m = outline.off_edge_m(at_m);
+        let is_within = distance_m <= margin_m;
+        let own_m = if is_within { distance_m } else { f32::INFINITY };
+        let before_m = distances_m[place];
+        owners[place] = if own_m < before_m {
+            track
+        } else {
+            former[place]
+        };
+        distances_m[place] = least(own_m, before_m);
     }
 }
 
