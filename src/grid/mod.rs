@@ -125,7 +125,7 @@ pub struct Grid {
     passed: Vec<Stretch>,
     /// Cells in which rays ended, and how high.
     hits: Vec<(Cell, u8)>,
-    /// Returns on road users that move.
+    /// Obstacles that are returns on road users that move.
     is_moving: Vec<bool>,
 }
 
@@ -288,6 +288,7 @@ impl Grid {
                 sweep,
                 placements,
                 margin_m,
+                self.evidence.is_obstacle(),
                 &mut self.is_moving,
             );
         }

@@ -19,14 +19,15 @@ pub(super) fn moves(object: &Object, parameters: &GridParameters) -> bool {
     object.measured && libm::fabs(object.speed_mps) > least_mps
 }
 
-/// Marks the returns on a road user that moves. Its box is valid at the end of the sweep; each
-/// return is compared with where it was when it was seen.
+/// Marks the obstacles that are returns on a road user that moves. Its box is valid at the end of the
+/// sweep; each return is compared with where it was when it was seen.
 pub(super) fn mark_returns(
     object: &Object,
     scan: &Scan,
     sweep: &Sweep,
     placements: &[Placement],
     margin_m: f64,
+    is_obstacle: &[bool],
     is_moving: &mut [bool],
 ) {
     let (sine, cosine) = libm::sincos(object.yaw_rad);
@@ -42,7 +43,7 @@ pub(super) fn mark_returns(
     for column in (first..first + count).map(|column| scan.over_seam(column)) {
         let age_s = scan.age_s(column);
         for point in (0..MAX_LAYERS).map(|layer| scan.index(column, layer)) {
-            if scan.has_return(point) {
+            if is_obstacle[point] {
                 let [x, y, _] = scan.point_m(point).map(f64::from);
                 let [x, y] = placements[column].local_m([x, y]);
                 let at_end = [x + age_s * velocity_mps[0], y + age_s * velocity_mps[1]];

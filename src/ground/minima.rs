@@ -115,8 +115,13 @@ fn highest_m(minima: &[Minimum], capacity: usize) -> f32 {
 /// Adds one of the lowest `capacity`, lowest first; of equal ones the first to come.
 fn insert(minima: &mut Vec<Minimum>, capacity: usize, minimum: Minimum) {
     minima.truncate(capacity - 1);
-    let place = minima.partition_point(|kept| kept.above_m <= minimum.above_m);
-    minima.insert(place, minimum);
+    minima.push(minimum);
+    // They are few: each is passed on its own.
+    let mut place = minima.len() - 1;
+    while place > 0 && minima[place - 1].above_m > minimum.above_m {
+        minima.swap(place - 1, place);
+        place -= 1;
+    }
 }
 
 #[cfg(test)]
