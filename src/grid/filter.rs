@@ -189,15 +189,19 @@ impl Filter {
         revolution: u32,
         map: &mut Map,
     ) {
-        for (cell, top) in hits {
-            let ([x, y], place) = cell.in_tile();
+        let tile_of = |(cell, _): &(Cell, u8)| cell.in_tile().0;
+        for hits in hits.chunk_by(|a, b| tile_of(a) == tile_of(b)) {
+            let [x, y] = tile_of(&hits[0]);
             let tile = map.tile_mut(window.tile(x, y));
-            if window.take_hit(*cell) {
-                let after = (tile.log_odds[place] + self.hit).min(self.highest);
-                tile.set(place, after, revolution);
-                tile.surely_free[place / TILE_CELLS] &= !(1 << (place % TILE_CELLS));
+            for (cell, top) in hits {
+                let (_, place) = cell.in_tile();
+                if window.take_hit(*cell) {
+                    let after = (tile.log_odds[place] + self.hit).min(self.highest);
+                    tile.set(place, after, revolution);
+                    tile.surely_free[place / TILE_CELLS] &= !(1 << (place % TILE_CELLS));
+                }
+                tile.top[place] = tile.top[place].max(*top);
             }
-            tile.top[place] = tile.top[place].max(*top);
         }
     }
 }

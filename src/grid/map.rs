@@ -169,16 +169,11 @@ impl Map {
         tile
     }
 
-    /// The tile in which a cell of the local frame lies, if anything was ever seen there, and
-    /// its place in it.
-    pub(super) fn cell_mut(&mut self, cell: [i32; 2]) -> Option<(&mut Tile, usize)> {
-        const SIDE: i32 = TILE_CELLS as i32;
-        let place = cell.map(|at| at.div_euclid(SIDE));
-        let [column, row] = cell.map(|at| at.rem_euclid(SIDE) as usize);
+    /// The tile at a place, if anything was ever seen there, to be changed.
+    pub(super) fn known_mut(&mut self, place: [i32; 2]) -> Option<&mut Tile> {
         let slot = self.slot(place);
         let tile = self.slots[slot].as_deref_mut();
-        let tile = tile.filter(|tile| tile.place == place)?;
-        Some((tile, row * TILE_CELLS + column))
+        tile.filter(|tile| tile.place == place)
     }
 
     /// The tile at a place, if anything was ever seen there.

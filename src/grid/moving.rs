@@ -1,7 +1,7 @@
 //! Road users that move, for the map to leave them out.
 
 use super::GridParameters;
-use super::map::Map;
+use super::map::{Map, TILE_CELLS};
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::ego::{Placement, Sweep};
 use crate::time::Time;
@@ -56,6 +56,7 @@ pub(super) fn mark_returns(
 /// Where something moves nothing stands: takes back what was seen in its box, and, as long as it
 /// is new, in those before.
 pub(super) fn clear_way(object: &Object, now: Time, map: &mut Map, cell_m: f64, revolution: u32) {
+    const SIDE: i32 = TILE_CELLS as i32;
     let age_s = (now - object.seen_since).seconds();
     let is_new = age_s < UNKNOWN_S;
     let back_m = if is_new {
@@ -75,13 +76,21 @@ pub(super) fn clear_way(object: &Object, now: Time, map: &mut Map, cell_m: f64, 
         let places = corners.iter().map(|corner| corner[axis] / cell_m);
         libm::floor(places.reduce(pick).unwrap_or(0.0)) as i32
     };
-    for y in bound(1, f64::min)..=bound(1, f64::max) {
-        for x in bound(0, f64::min)..=bound(0, f64::max) {
+    let cells = [0, 1].map(|axis| (bound(axis, f64::min), bound(axis, f64::max)));
+    let [across, along] = cells.map(|(low, high)| low.div_euclid(SIDE)..=high.div_euclid(SIDE));
+    for place in along.flat_map(|y| across.clone().map(move |x| [x, y])) {
+        let Some(tile) = map.known_mut(place) else {
+            continue;
+        };
+        let corner = place.map(|tile| tile * SIDE);
+        let [columns, rows] = [0, 1].map(|axis: usize| {
+            let ((low, high), first) = (cells[axis], corner[axis]);
+            low.max(first)..=high.min(first + SIDE - 1)
+        });
+        for [x, y] in rows.flat_map(|y| columns.clone().map(move |x| [x, y])) {
+            let cell = (y - corner[1]) as usize * TILE_CELLS + (x - corner[0]) as usize;
             let middle_m = [x, y].map(|at| (f64::from(at) + 0.5) * cell_m);
-            if let Some((tile, cell)) = map.cell_mut([x, y])
-                && tile.log_odds[cell] > 0
-                && outline.distance_m(middle_m) <= 0.0
-            {
+            if tile.log_odds[cell] > 0 && outline.distance_m(middle_m) <= 0.0 {
                 tile.set(cell, 0, revolution);
             }
         }
