@@ -1,6 +1,6 @@
 //! Returns of one revolution that may be road users, placed, cluster by cluster and part by part.
 
-use super::parting::{CUT_M, Parting};
+use super::parts::{CUT_M, Parts};
 use super::placing::{Bounds, Placed, Placing};
 use super::{Scene, TrackParameters, people};
 use crate::cluster::Clusters;
@@ -52,7 +52,7 @@ pub(super) struct Placer {
     cluster: Placing,
     placed: Vec<Placed>,
     patches: Vec<Patch>,
-    parting: Parting,
+    parts: Parts,
     /// The patches before people were told apart, and where one of them is cut.
     former: Vec<Patch>,
     cuts: Vec<usize>,
@@ -152,9 +152,9 @@ impl Placer {
     /// Adds the parts of the cluster, one after the other and each in the order of the scan.
     fn divide(&mut self, whole: &Bounds, is_too_tall: bool) {
         let cluster = &self.cluster;
-        self.parting
+        self.parts
             .divide(cluster, whole, is_too_tall, self.origin_m);
-        self.parting
+        self.parts
             .put(cluster, &mut self.placed, |own, bounds, goes_on| {
                 self.patches.push(Patch {
                     begin: own.start,

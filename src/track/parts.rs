@@ -1,4 +1,4 @@
-//! Parts a cluster: what touches, seen from above, is one body, up to the height at which trees and
+//! Divides a cluster into parts: what touches, seen from above, is one body, up to the height at which trees and
 //! roofs are cut off.
 //!
 //! Returns that follow each other lie mostly in one cell of the floor, and at one level: what can be
@@ -16,7 +16,7 @@ use crate::float::{bounds_of, greatest};
 
 /// The parts of one cluster. Its buffers are made once.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Parting {
+pub(super) struct Parts {
     floor: Floor,
     /// Where on it each return lies, and in the last bits how high.
     keys: Vec<u32>,
@@ -119,8 +119,8 @@ fn is_upper(level: u32) -> bool {
     level >= CLOSE
 }
 
-impl Parting {
-    /// Parts a cluster in the box `whole`, placed relative to `origin_m`. What is above the cut
+impl Parts {
+    /// Divides a cluster in the box `whole`, placed relative to `origin_m`. What is above the cut
     /// belongs to a part that goes on there, unless all of it is too tall.
     pub(super) fn divide(
         &mut self,
