@@ -58,7 +58,7 @@ impl Lowest {
     }
 
     /// Notes the levels of the returns in at most [`MOST_COLUMNS`] columns that may be ground, and
-    /// gives them, so that some can be taken out: [`NO_LEVEL_M`] are those that may not.
+    /// gives them, so that some can be taken out: [`NO_LEVEL_M`] or more are those that may not.
     pub(super) fn note(
         &mut self,
         points: &Points<'_>,

@@ -74,8 +74,9 @@ fn take_out(vehicle: &Vehicle, [x_m, y_m]: [&[f32]; 2], levels_m: &mut [f32]) {
     let (x_m, y_m) = (&x_m[..levels_m.len()], &y_m[..levels_m.len()]);
     for point in 0..levels_m.len() {
         let is_taken = vehicle.off_edge_m([x_m[point], y_m[point]]) < AROUND_M;
-        let level_m = levels_m[point];
-        levels_m[point] = if is_taken { NO_LEVEL_M } else { level_m };
+        // Added: what is set under a condition would be stored under a mask, slowly. Beside it any
+        // level is nothing.
+        levels_m[point] += if is_taken { NO_LEVEL_M } else { 0.0 };
     }
 }
 
