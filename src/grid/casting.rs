@@ -54,14 +54,16 @@ impl Corner {
 /// Goes on with the outline from one corner to the next. Within a cell there is nothing to do: the
 /// line that came to it has passed it.
 fn connect(from: Corner, to: Corner, window: &mut Window) {
-    if from.cell != to.cell {
+    // What is below the window by less than a place is exact lies in its lowest row, too.
+    let is_below = [from, to].map(|corner| corner.at[1] < 0.0);
+    if from.cell != to.cell || is_below[0] != is_below[1] {
         window.outline(from.at, to.at);
     }
 }
 
 impl Casting {
-    /// Marks the cells that rays passed on these stretches. They come by column, each column's
-    /// first begins at the sensor, and the others do not meet it or each other.
+    /// Marks the cells that rays passed on these stretches. They come by column, of which none is left
+    /// out; each column's first begins at the sensor, and the others do not meet it or each other.
     pub(super) fn cast(
         &mut self,
         stretches: &[Stretch],

@@ -236,3 +236,38 @@ fn is_gone(top: u8, at_m: [f64; 2], distance_m: f64, view: &View<'_>) -> bool {
     let top_m = f32::from(top) * HEIGHT_UNIT_M;
     pass_m < (BELOW_SHARE * top_m).min(top_m - BELOW_TOP_M)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parameter::Profile;
+
+    #[test]
+    fn every_hit_goes_to_its_own_tile_and_each_cell_counts_once() {
+        let filter = Filter::new(&GridParameters::profile(Profile::Default));
+        let (mut window, mut map) = (Window::new(2), Map::new(8));
+        window.begin([-1, -1]);
+        let hits: Vec<(Cell, u8)> = [
+            ([10.5, 20.5], 3),
+            ([11.5, 20.5], 4),
+            ([74.5, 20.5], 5),
+            ([74.5, 84.5], 6),
+            ([10.5, 84.5], 7),
+            ([10.5, 20.5], 9),
+        ]
+        .into_iter()
+        .filter_map(|(at, top)| Some((window.hit(at)?, top)))
+        .collect();
+        assert_eq!(hits.len(), 6);
+        filter.occupy(&hits, &mut window, 1, &mut map);
+        let place = 20 * TILE_CELLS + 10;
+        for (tile, top) in [([-1, -1], 9), ([0, -1], 5), ([0, 0], 6), ([-1, 0], 7)] {
+            let tile = map.tile_mut(tile);
+            let occupied = tile.log_odds.iter().filter(|log_odds| **log_odds > 0);
+            let expected = if top == 9 { 2 } else { 1 };
+            assert_eq!(occupied.count(), expected);
+            assert_eq!((tile.log_odds[place], tile.top[place]), (filter.hit, top));
+        }
+        assert_eq!(map.tile_mut([-1, -1]).top[place + 1], 4);
+    }
+}

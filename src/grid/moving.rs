@@ -96,3 +96,55 @@ pub(super) fn clear_way(object: &Object, now: Time, map: &mut Map, cell_m: f64, 
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::Class;
+
+    #[test]
+    fn a_way_is_cleared_up_to_its_edges_in_all_known_tiles_that_it_meets() {
+        const SIDE: i32 = TILE_CELLS as i32;
+        let mut map = Map::new(8);
+        let places: Vec<_> = (-2..2).flat_map(|y| (-3..3).map(move |x| [x, y])).collect();
+        for place in &places {
+            // Nothing was seen in the first one that it meets.
+            if *place != [-2, -1] {
+                map.tile_mut(*place).log_odds.fill(900);
+            }
+        }
+        let now = Time::from_micros(1_700_000_000_000_000);
+        // With its unsure edges from -6.98 m to 6.97 m, and from -0.98 m to 0.97 m.
+        let object = Object {
+            id: 1,
+            class: Class::Cyclist,
+            class_probability: 0.9,
+            measured: true,
+            centre_m: [-0.005, -0.005, 0.0],
+            yaw_rad: 0.0,
+            speed_mps: 5.0,
+            yaw_rate_radps: 0.0,
+            length_m: 13.55,
+            width_m: 1.55,
+            height_m: 1.5,
+            position_deviation_m: [0.1; 2],
+            yaw_deviation_rad: 0.1,
+            speed_deviation_mps: 0.1,
+            existence: 0.9,
+            first_seen: now,
+            seen_since: now,
+            last_measured: now,
+            points: 9,
+        };
+        clear_way(&object, now, &mut map, 0.1, 3);
+        assert!(map.tile([-2, -1]).is_none());
+        for tile in map.tiles() {
+            let [x, y] = tile.place().map(|place| place * SIDE);
+            for (cell, log_odds) in tile.log_odds().iter().enumerate() {
+                let (x, y) = (x + cell as i32 % SIDE, y + cell as i32 / SIDE);
+                let is_met = (-70..70).contains(&x) && (-10..10).contains(&y);
+                assert_eq!(*log_odds == 0, is_met, "{x} {y}");
+            }
+        }
+    }
+}

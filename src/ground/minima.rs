@@ -169,4 +169,15 @@ mod tests {
         let mut ranges_m = (0..minima.len()).map(|n| minima.get(n).1.norm());
         assert!(ranges_m.all(|range_m| range_m > 8.9));
     }
+
+    #[test]
+    fn the_few_lowest_are_kept_lowest_first_and_of_equal_ones_the_first_to_come() {
+        let mut minima = vec![];
+        for (point, above_m) in (0..).zip([0.3, 0.1, 0.3, 0.2, 0.1, 0.4]) {
+            insert(&mut minima, 4, Minimum { above_m, point });
+        }
+        // The last one is not asked whether it is low enough.
+        let points: Vec<u32> = minima.iter().map(|minimum| minimum.point).collect();
+        assert_eq!(points, [1, 4, 3, 5]);
+    }
 }

@@ -175,6 +175,17 @@ mod tests {
     }
 
     #[test]
+    fn nothing_is_left_of_what_was_settled_before() {
+        let mut claims = Claims::default();
+        claims.settle(&[0.0, 4.0, 4.5].map(at), &[0, 1], &forecasts(), true);
+        for near in [&[0, 1][..], &[0], &[]] {
+            claims.settle(&[-50.0, -60.0].map(at), near, &forecasts(), true);
+            assert_eq!(claims.owners().collect::<Vec<_>>(), [None; 2]);
+            assert_eq!(claims.only(), None);
+        }
+    }
+
+    #[test]
     fn the_only_owner_is_known_with_its_share_and_what_each_of_several_has() {
         assert_eq!(
             owners(&[-5.0, 0.0, 0.5, 1.0].map(at), true).1,

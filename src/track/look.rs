@@ -333,4 +333,54 @@ mod tests {
             assert_eq!(ends, [columns.start, columns.end - 1]);
         }
     }
+
+    #[test]
+    fn the_end_of_a_group_is_the_lowest_return_of_its_column() {
+        let scan = scan_of(1800, |column, layer| match layer {
+            4..9 if (100..120).contains(&column) => 1000,
+            _ => 0,
+        });
+        let mut spots = spots_of(&scan);
+        // It begins in the middle, at a column's lowest.
+        spots.rotate_left(35);
+        let ends = Columns::of(&spots, &scan).ends;
+        assert_eq!(ends.map(|end| scan.layer(end.point as usize)), [4, 4]);
+    }
+
+    #[test]
+    fn a_group_goes_on_in_the_share_of_its_columns_that_could_be_seen_above_it() {
+        // Of 20 columns every second is missed; of the ten others two reach the highest layer, and
+        // above two more there is something at the same distance.
+        let scan = scan_of(1800, |column, layer| match (column, layer) {
+            (100 | 102, 4..MAX_LAYERS) => 1000,
+            (104 | 106, 4..10) => 1000,
+            (100..120, 4..9) if column % 2 == 0 => 1000,
+            _ => 0,
+        });
+        let mut spots = spots_of(&scan);
+        spots.retain(|spot| {
+            let point = spot.point as usize;
+            scan.layer(point) < 9 || scan.column(point) < 104
+        });
+        let columns = Columns::of(&spots, &scan);
+        assert_eq!(columns.goes_on(), 0.25);
+        assert_eq!(columns.missed_between(&scan), 0.9);
+    }
+
+    #[test]
+    fn what_is_nearer_beside_a_group_cuts_it_in_any_of_its_layers_and_in_no_other() {
+        let is_cut = |beside: usize| {
+            let scan = scan_of(1800, |column, layer| match column {
+                100..120 if (4..9).contains(&layer) => 1000,
+                120..123 if layer == beside => 500,
+                _ => 0,
+            });
+            let mut spots = spots_of(&scan);
+            spots.retain(|spot| scan.column(spot.point as usize) < 120);
+            Look::at(&spots, &scan, Vector2::zeros()).is_cut
+        };
+        for (layer, cut) in [(3, false), (4, true), (6, true), (8, true), (9, false)] {
+            assert_eq!(is_cut(layer), [false, cut], "{layer}");
+        }
+    }
 }

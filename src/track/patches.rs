@@ -260,4 +260,55 @@ mod tests {
         assert_eq!((people.len(), walls.len()), (1, 1), "{people:?} {walls:?}");
         assert!(people[0].is_suspect && people[0].diagonal_m() < 1.0);
     }
+
+    #[test]
+    fn what_is_above_a_part_belongs_to_it_if_it_is_close_above_most_of_it() {
+        // 10 m away, with a gap below layers 9 and 10, which pass 2.4 and 2.8 m above the ground;
+        // layer 11 passes 3.1 m above it, too high to say anything of what is below.
+        let top_m = |over: usize, layers: usize| {
+            let (placer, _) = patches(|column, layer| match (column, layer) {
+                (100..150, 3..=7) => 1000,
+                (100..150, 9..11) if column < 100 + over => 1000,
+                (100..150, 11) if layer < layers => 1000,
+                _ => 0,
+            });
+            let patches = placer.patches().iter();
+            patches.map(|patch| patch.bounds.top_m).fold(0.0, f32::max)
+        };
+        assert!(top_m(50, 0) > 2.7);
+        assert!(top_m(10, 0) < CUT_M);
+        assert!(top_m(50, 12) > 3.0);
+        assert!(top_m(10, 12) < CUT_M);
+    }
+
+    #[test]
+    fn what_lies_far_behind_the_top_of_a_van_is_no_roof() {
+        // 10 m away layer 9 passes 2.4 m above the ground; from column to column it recedes, from
+        // 0.2 m to 1.4 m behind what is below.
+        let (placer, _) = patches(|column, layer| match (column, layer) {
+            (100..150, 3..9) => 1000,
+            (100..150, 9) => 1020 + (column as u16 - 100) / 10 * 30,
+            _ => 0,
+        });
+        let above = |patch: &Patch| {
+            let own = placer.placed(patch).iter();
+            own.filter(|placed| placed.above_m > 2.3).count()
+        };
+        assert_eq!(placer.patches().iter().map(above).sum::<usize>(), 20);
+    }
+
+    #[test]
+    fn parts_that_take_turns_are_in_the_order_of_the_scan_and_share_nothing() {
+        // 15 m away a wall; a person stands 0.78 m before it.
+        let (placer, _) = patches(|column, layer| match column {
+            40..44 if layer < 8 => 1422,
+            10..80 => 1500,
+            _ => 0,
+        });
+        assert_eq!(placer.patches().len(), 2);
+        for patch in placer.patches() {
+            let own = placer.placed(patch);
+            assert!(own.is_sorted_by(|a, b| a.point < b.point));
+        }
+    }
 }

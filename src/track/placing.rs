@@ -224,3 +224,28 @@ impl Placing {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stretch_is_what_all_of_them_are_there() {
+        let numbers = vec![1.0, 2.0, 3.0, 4.0];
+        let placing = Placing {
+            x_m: numbers.clone(),
+            y_m: numbers.iter().map(|number| 10.0 * number).collect(),
+            above_m: numbers.iter().map(|number| 0.1 * number).collect(),
+            point: vec![5, 6, 7, 8],
+            count: 4,
+            brought: 2,
+            ..Placing::default()
+        };
+        let own = |placed: Placed| (placed.at_m, placed.point, placed.is_brought);
+        let stretch: Vec<_> = placing.stretch(1..3).map(own).collect();
+        assert_eq!(stretch, [([2.0, 20.0], 6, true), ([3.0, 30.0], 7, false)]);
+        let all: Vec<_> = placing.iter().map(own).collect();
+        assert_eq!(all[1..3], stretch);
+        assert_eq!(all.len(), 4);
+    }
+}
