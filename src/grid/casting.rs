@@ -87,10 +87,8 @@ impl Casting {
             let (mut before, mut reached): (&[Stretch], _) = (&[], None);
             for now in half.chunk_by(|a, b| a.column == b.column) {
                 let column = now[0].column;
-                let [left, right] = [column, column + 1].map(|border| {
-                    let at = self.borders[border].at(now[0].to_m);
-                    Corner::at(at)
-                });
+                let [left, right] = [column, column + 1]
+                    .map(|border| Corner::at(self.borders[border].at(now[0].to_m)));
                 match reached {
                     Some(reached) if before.len() == 1 && now.len() == 1 => {
                         connect(reached, left, window);

@@ -4,9 +4,9 @@ use std::ops::RangeInclusive;
 
 use nalgebra::Vector2;
 
-use super::spots::Spot;
+use super::spots::{Spot, bounds_m};
 use crate::cloud::{MAX_LAYERS, Scan};
-use crate::float::{greatest, least};
+use crate::float::least;
 
 /// Everything that is measured of a group without knowing the object.
 #[derive(Debug, Clone, Copy)]
@@ -244,14 +244,9 @@ fn cuts(layers: RangeInclusive<usize>, ends: [&Spot; 2], scan: &Scan) -> [bool; 
 
 /// Diagonal of the returns at some heights, if they are not too few.
 fn extent_m(spots: &[Spot], is_there: impl Fn(f32) -> bool, fewest: usize) -> Option<f64> {
-    let (mut count, mut low_m, mut high_m) = (0, [f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-    for spot in spots.iter().filter(|spot| is_there(spot.above_m)) {
-        count += 1;
-        for (axis, metres) in spot.at_m.into_iter().enumerate() {
-            low_m[axis] = least(low_m[axis], metres);
-            high_m[axis] = greatest(high_m[axis], metres);
-        }
-    }
+    let mut count = 0;
+    let there = spots.iter().filter(|spot| is_there(spot.above_m));
+    let [low_m, high_m] = bounds_m(there.inspect(|_| count += 1));
     (count >= fewest).then(|| {
         let [along_m, across_m] = [0, 1].map(|axis| f64::from(high_m[axis] - low_m[axis]));
         libm::hypot(along_m, across_m)

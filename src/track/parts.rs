@@ -1,5 +1,5 @@
-//! Divides a cluster into parts: what touches, seen from above, is one body, up to the height at which trees and
-//! roofs are cut off.
+//! Divides a cluster into parts: what touches, seen from above, is one body, up to the height at
+//! which trees and roofs are cut off.
 //!
 //! Returns that follow each other lie mostly in one cell of the floor, and at one level: what can be
 //! said of all of them is said once, of the `Step` that they are.

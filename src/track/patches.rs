@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_that_take_turns_are_in_the_order_of_the_scan_and_share_nothing() {
+    fn parts_that_take_turns_are_each_in_the_order_of_the_scan() {
         // 15 m away a wall; a person stands 0.78 m before it.
         let (placer, _) = patches(|column, layer| match column {
             40..44 if layer < 8 => 1422,

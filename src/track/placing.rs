@@ -60,11 +60,6 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// Its middle from above.
-    pub(super) fn middle_m(&self) -> [f32; 2] {
-        [0, 1].map(|axis| 0.5 * (self.low_m[axis] + self.high_m[axis]))
-    }
-
     /// That of no returns.
     pub(super) const NOTHING: Self = Self {
         low_m: [f32::INFINITY; 2],
@@ -72,6 +67,11 @@ impl Bounds {
         floor_m: f32::INFINITY,
         top_m: f32::NEG_INFINITY,
     };
+
+    /// Its middle from above.
+    pub(super) fn middle_m(&self) -> [f32; 2] {
+        [0, 1].map(|axis| 0.5 * (self.low_m[axis] + self.high_m[axis]))
+    }
 
     /// The box that holds some returns.
     pub(super) fn of(returns: &[Placed]) -> Self {
