@@ -14,6 +14,14 @@ use kreisel::wire::Envelope;
 use kreisel::wire::point_cloud::CompactPointCloud;
 use proptest::prelude::*;
 
+/// The default profile's, and clustered so high that all layers have a part in it.
+fn parameters() -> ClusterParameters {
+    ClusterParameters {
+        highest_m: 4.5,
+        ..ClusterParameters::profile(Profile::Default)
+    }
+}
+
 /// A scan of distances in centimetres, in array order.
 fn scan_of(distances_cm: &[u16], start_deg: f32, end_deg: f32) -> Scan {
     let distances: Vec<u8> = distances_cm
@@ -198,7 +206,7 @@ proptest! {
         let distances = random_distances(seed, columns, stray);
         let (start_deg, end_deg) = if falls { (215.0, gap_deg - 145.0) } else { (0.01, 360.0 - gap_deg) };
         let scan = scan_of(&distances, start_deg, end_deg);
-        let mut parameters = ClusterParameters::profile(Profile::Default);
+        let mut parameters = parameters();
         (parameters.eps_m, parameters.eps_per_m) = (eps_m, eps_per_m);
         parameters.min_points = min_points;
         if let Some(columns) = window_columns {
@@ -212,7 +220,7 @@ proptest! {
 
 #[test]
 fn a_sweep_that_overlaps_itself_at_the_seam_is_clustered_as_defined() {
-    let parameters = ClusterParameters::profile(Profile::Default);
+    let parameters = parameters();
     // The last columns and the fifth to seventh lie at the same azimuths.
     let mut twice = vec![0; 360 * 16];
     for column in (4..7).chain(357..360) {
@@ -227,7 +235,7 @@ fn a_sweep_that_overlaps_itself_at_the_seam_is_clustered_as_defined() {
 
 #[test]
 fn what_is_exactly_as_far_as_neighbours_can_be_is_one() {
-    let mut parameters = ClusterParameters::profile(Profile::Default);
+    let mut parameters = parameters();
     (parameters.min_points, parameters.min_points_far) = (1, 1);
     parameters.eps_per_m = 0.0;
     for near_cm in 120..500 {
@@ -248,7 +256,7 @@ fn what_is_exactly_as_far_as_neighbours_can_be_is_one() {
 
 #[test]
 fn of_equally_near_core_points_a_border_point_goes_to_the_first() {
-    let mut parameters = ClusterParameters::profile(Profile::Default);
+    let mut parameters = parameters();
     parameters.eps_per_m = 0.0;
     parameters.min_points_range_m = 100.0;
     for seed in 0..300 {
@@ -271,7 +279,7 @@ fn of_equally_near_core_points_a_border_point_goes_to_the_first() {
 
 #[test]
 fn runs_that_lead_away_from_the_sensor_are_joined_as_defined() {
-    let mut parameters = ClusterParameters::profile(Profile::Default);
+    let mut parameters = parameters();
     (parameters.min_points, parameters.min_points_far) = (1, 1);
     parameters.eps_per_m = 0.0;
     for seed in 0..500 {
@@ -312,7 +320,7 @@ fn a_real_revolution_is_clustered_as_defined() {
         .collect();
     let scan = scan_of(&distances, cloud.start_azimuth_deg, cloud.end_azimuth_deg);
     let above_road: Vec<bool> = scan.z_m().iter().map(|z| *z < -1.4).collect();
-    let parameters = ClusterParameters::profile(Profile::Default);
+    let parameters = parameters();
     let compared = assert_is_dbscan(&scan, &above_road, &parameters);
     assert!(compared > 2000, "{compared} points are no test");
 }

@@ -1,5 +1,5 @@
 //! Step four: returns that belong together, of those above the ground (thesis section 4.1.2) and not
-//! above all road users.
+//! above most road users.
 //!
 //! DBSCAN (Ester et al. 1996) without a tree: the array is sorted by azimuth and elevation
 //! already, so that the neighbours of a point stand in a few columns of it. What is clustered is put
@@ -46,9 +46,10 @@ choices! {
 parameters! {
     /// The clusters: DBSCAN over the returns that are not ground.
     pub struct ClusterParameters "cluster" {
-        /// Height above the ground up to which returns are clustered. Crowns of trees, fronts of
-        /// houses and bridges above that say nothing of road users, and are half of a city.
-        highest_m: f64 = 4.5, thesis 1000.0, in 1.0..=1000.0, "m";
+        /// Height above the ground up to which returns are clustered: people and cars are lower.
+        /// Crowns of trees, fronts of houses and bridges are most of what is above it in a city; what
+        /// goes on from a cluster, as a lorry does, the tracks add.
+        highest_m: f64 = 2.5, thesis 1000.0, in 1.0..=1000.0, "m";
         /// Where neighbours of a point are looked for.
         window: WindowSetting = WindowSetting::Exact, thesis WindowSetting::Columns, "";
         /// Columns to either side when window is "columns": 2 makes 5 x 16 = 80 candidates.

@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 
 use nalgebra::Vector2;
 
+use super::above::same_above;
 use super::spots::{Spot, bounds_m};
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::float::least;
@@ -129,20 +130,6 @@ impl Look {
     pub(super) fn sight(&self) -> Vector2<f64> {
         (self.middle_m - self.sensor_m) / self.range_m.max(0.1)
     }
-}
-
-/// Difference of ranges of two returns of a column, one above the other, within which they are of
-/// the same thing.
-pub(super) const SAME_M: f32 = 0.8;
-
-/// The return directly above one, if it is there and of the same thing.
-pub(super) fn same_above(scan: &Scan, point: usize) -> Option<usize> {
-    let ranges_m = scan.range_m();
-    let above = point + 1;
-    let is_same = scan.layer(above) > 0
-        && ranges_m[above] > 0.0
-        && (ranges_m[above] - ranges_m[point]).abs() < SAME_M;
-    is_same.then_some(above)
 }
 
 /// Whether something nearer hides what is above a point.

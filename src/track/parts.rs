@@ -8,8 +8,8 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
+use super::above::SAME_M;
 use super::floor::Floor;
-use super::look::SAME_M;
 use super::placing::{Bounds, Placed, Placing};
 use crate::cloud::MAX_LAYERS;
 use crate::float::{bounds_of, greatest};

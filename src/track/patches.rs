@@ -1,10 +1,10 @@
 //! Returns of one revolution that may be road users, placed, cluster by cluster and part by part.
 
+use super::above::Climber;
 use super::parts::{CUT_M, Parts};
 use super::placing::{Bounds, Placed, Placing};
 use super::{Scene, TrackParameters, people};
 use crate::cluster::Clusters;
-use crate::float::greatest;
 
 /// A cluster, or a part of one.
 #[derive(Debug, Clone, Copy)]
@@ -48,7 +48,9 @@ impl Patch {
 pub(super) struct Placer {
     /// Where the sensor is, in the local frame.
     origin_m: [f64; 2],
-    /// The returns of the cluster that is being divided.
+    climber: Climber,
+    /// The points of the cluster that is being divided, and its returns.
+    points: Vec<u32>,
     cluster: Placing,
     placed: Vec<Placed>,
     patches: Vec<Patch>,
@@ -75,18 +77,25 @@ impl Placer {
         self.origin_m = origin_m;
         self.placed.clear();
         self.patches.clear();
+        self.climber.begin(scene, clusters.members());
         self.cluster.begin(scene, origin_m);
+        let highest_m = parameters.highest_object_m as f32;
         for points in clusters.iter() {
-            self.cluster.place(points, scene);
-            let mut bounds = self.cluster.bounds();
-            if (CUT_M..parameters.highest_object_m as f32).contains(&bounds.top_m) {
-                // What was too high to be clustered says that this is no road user either.
-                bounds.top_m = greatest(bounds.top_m, self.cluster.goes_on_to_m(scene));
-            }
+            let top_m = self.climber.top_m(points, highest_m, scene.heights_m);
+            let is_too_tall = top_m > highest_m;
+            // Of what is too tall just what covers something is of use.
+            let to_m = if is_too_tall { CUT_M } else { highest_m };
+            self.climber
+                .take_up(points, to_m, scene.heights_m, &mut self.points);
+            self.cluster.place(&self.points, scene);
+            let bounds = Bounds {
+                top_m,
+                ..self.cluster.bounds()
+            };
             let begin = self.placed.len();
             let whole = Patch {
                 begin,
-                end: begin + points.len(),
+                end: begin + self.points.len(),
                 bounds,
                 goes_on: false,
                 is_suspect: false,
@@ -98,7 +107,6 @@ impl Placer {
             } else {
                 let is_structure = !whole.can_be_road_user(parameters);
                 let first = self.patches.len();
-                let is_too_tall = f64::from(whole.bounds.top_m) > parameters.highest_object_m;
                 self.divide(&whole.bounds, is_too_tall);
                 for patch in &mut self.patches[first..] {
                     patch.is_suspect = is_structure;
@@ -142,6 +150,11 @@ impl Placer {
     /// The parts of all clusters.
     pub(super) fn patches(&self) -> &[Patch] {
         &self.patches
+    }
+
+    /// Of every point of the scan whether it is of a cluster, or goes on above one.
+    pub(super) fn members(&self) -> &[bool] {
+        self.climber.members()
     }
 
     /// The returns of a patch, in the order of the scan.

@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use super::look::same_above;
 use super::{Scene, seam};
 use crate::cloud::MAX_LAYERS;
 use crate::float::{bounds_of, greatest, least};
@@ -162,15 +161,6 @@ impl Placing {
             self.x_m[place] = origin_m[0] + distance_m * direction[0] as f32;
             self.y_m[place] = origin_m[1] + distance_m * direction[1] as f32;
         }
-    }
-
-    /// Height above the ground to which it goes on in the returns directly above its own ones, be
-    /// they of the cluster or not; minus infinity if there are none.
-    pub(super) fn goes_on_to_m(&self, scene: &Scene<'_>) -> f32 {
-        let own = self.point.iter();
-        let above = own.filter_map(|point| same_above(scene.scan, *point as usize));
-        let heights_m = above.map(|above| scene.heights_m[above]);
-        heights_m.fold(f32::NEG_INFINITY, greatest)
     }
 
     /// Where they are from above.

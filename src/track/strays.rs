@@ -9,7 +9,6 @@ use super::Scene;
 use super::rectangle::Rectangle;
 use super::road_user::Track;
 use super::spots::Spot;
-use crate::cluster::Clusters;
 use crate::marks::marked;
 
 /// Finds them. Its buffers are made once.
@@ -29,11 +28,12 @@ const NEAR_M: f64 = 0.4;
 const FARTHEST_M: f64 = 1.0;
 
 impl Strays {
-    /// Adds them to the spots of tracks that may be no cluster.
+    /// Adds them to the spots of tracks that may be no cluster, given which points are `members` of
+    /// one.
     pub(super) fn add(
         &mut self,
         tracks: &[Track],
-        clusters: &Clusters,
+        members: &[bool],
         scene: &Scene<'_>,
         spots: &mut Vec<Spot>,
     ) {
@@ -63,7 +63,7 @@ impl Strays {
             let heights_m = [LOW_M, track.height_m() + ABOVE_M].map(|metres| metres as f32);
             for columns in scan.stretches_across(&corners) {
                 let points = scan.points_of(&columns);
-                self.mark(scene, clusters, points.clone(), heights_m);
+                self.mark(scene, members, points.clone(), heights_m);
                 for point in marked(&self.marks).map(|place| points.start + place) {
                     let [x, y, _] = scan.point_m(point).map(f64::from);
                     let at_m = scene.placements[scan.column(point)].local_m([x, y]);
@@ -93,14 +93,14 @@ impl Strays {
     fn mark(
         &mut self,
         scene: &Scene<'_>,
-        clusters: &Clusters,
+        members: &[bool],
         points: Range<usize>,
         heights_m: [f32; 2],
     ) {
         self.marks.clear();
         self.marks.resize(points.len(), false);
         mark_strays(
-            &clusters.members()[points.clone()],
+            &members[points.clone()],
             &scene.scan.range_m()[points.clone()],
             &scene.heights_m[points],
             heights_m,

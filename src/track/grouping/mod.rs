@@ -91,7 +91,8 @@ impl Grouping {
     ) {
         self.placer.place(clusters, scene, parameters);
         self.divide(tracks, scene, parameters);
-        self.strays.add(tracks, clusters, scene, &mut self.spots);
+        let members = self.placer.members();
+        self.strays.add(tracks, members, scene, &mut self.spots);
         self.gather(tracks, scene);
         self.join_pieces(tracks, scene);
     }
