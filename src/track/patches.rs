@@ -258,6 +258,21 @@ mod tests {
     }
 
     #[test]
+    fn what_is_low_of_a_wall_is_no_road_user_though_all_above_it_is_higher_than_clusters() {
+        let parameters = TrackParameters::profile(Profile::Default);
+        // 35 m away layers 6 and 7 pass 0.1 and 1.3 m above the ground, the others 1.2 m apart.
+        let can_be = |layers: usize| {
+            let (placer, _) = patches(|column, layer| match column {
+                100..125 if (6..layers).contains(&layer) => 3500,
+                _ => 0,
+            });
+            let mut patches = placer.patches().iter();
+            patches.any(|patch| patch.can_be_road_user(&parameters))
+        };
+        assert_eq!([8, 9, 12].map(can_be), [true, true, false]);
+    }
+
+    #[test]
     fn a_house_is_structure_and_what_stands_apart_before_it_is_suspect() {
         let parameters = TrackParameters::profile(Profile::Default);
         // 15 m away a wall higher than a truck; a person stands 0.78 m before it.
