@@ -12,7 +12,13 @@ use crate::float::greatest;
 
 /// Difference of ranges of two returns of a column, one above the other, within which they are of
 /// the same thing.
-pub(super) const SAME_M: f32 = 0.8;
+const SAME_M: f32 = 0.8;
+
+/// Whether the return above one is there and of the same thing, given their ranges.
+#[inline(always)]
+pub(super) fn is_same(own_m: f32, above_m: f32) -> bool {
+    (above_m > 0.0) & ((above_m - own_m).abs() < SAME_M)
+}
 
 /// Climbs up from returns. Its buffers are made once.
 #[derive(Debug, Clone, Default)]
@@ -95,10 +101,8 @@ fn mark(range_m: &[f32], heights_m: &[f32], members: &[bool], goes_on: &mut [boo
     let (heights_m, members) = (&heights_m[1..=count], &members[1..=count]);
     let marks = &mut goes_on[..count];
     for point in 0..count {
-        marks[point] = (above_m[point] > 0.0)
-            & ((above_m[point] - own_m[point]).abs() < SAME_M)
-            & (heights_m[point] > CUT_M)
-            & !members[point];
+        marks[point] =
+            is_same(own_m[point], above_m[point]) & (heights_m[point] > CUT_M) & !members[point];
     }
     // The next one of the highest layer is the lowest of another column.
     for column in goes_on.as_chunks_mut::<MAX_LAYERS>().0 {
@@ -110,10 +114,8 @@ fn mark(range_m: &[f32], heights_m: &[f32], members: &[bool], goes_on: &mut [boo
 pub(super) fn same_above(scan: &Scan, point: usize) -> Option<usize> {
     let ranges_m = scan.range_m();
     let above = point + 1;
-    let is_same = scan.layer(above) > 0
-        && ranges_m[above] > 0.0
-        && (ranges_m[above] - ranges_m[point]).abs() < SAME_M;
-    is_same.then_some(above)
+    let is_there = scan.layer(above) > 0 && is_same(ranges_m[point], ranges_m[above]);
+    is_there.then_some(above)
 }
 
 #[cfg(test)]

@@ -2,14 +2,14 @@
 //!
 //! `objects` takes a revolution in: `patches` takes its clusters with what goes on `above` them, by
 //! `placing` them, what drives along with the sensor over the `seam` of the sweep as one, and
-//! divides them into `parts` that do not touch on the `floor`, and `people` side by side; `grouping` says which `spots` belong
-//! together, given what each track `claims` by its `forecast` and the `strays` near it, `assignment`
-//! what is whose, `sight` what is hidden and what is gone; `nearby` spares all of them what is far
-//! away. A `road_user` learns from each `look`, and the `view` of it in the road user's own axes, its
-//! `motion`, its `shape`, its `class`, of which there is a `belief`, and by its `trail` whether it
-//! moves; `existence` says whether it is there at all; what stands and is hardly a road user rests
-//! most of the time, and one that was lost gets its id back (`road_user`). `nearest` is the tracking
-//! of the thesis.
+//! divides them into `parts` that do not touch on the `floor`, and `people` side by side;
+//! `grouping` says which `spots` belong together, given what each track `claims` by its `forecast`
+//! and the `strays` near it, `assignment` what is whose, `sight` what is hidden and what is gone;
+//! `nearby` spares all of them what is far away. A `road_user` learns from each `look`, and the
+//! `view` of it in the road user's own axes, its `motion`, its `shape`, its `class`, of which there
+//! is a `belief`, and by its `trail` whether it moves; `existence` says whether it is there at all;
+//! what stands and is hardly a road user rests most of the time, and one that was lost gets its id
+//! back (`road_user`). `nearest` is the tracking of the thesis.
 
 mod above;
 

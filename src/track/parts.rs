@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::above::SAME_M;
+use super::above::is_same;
 use super::floor::Floor;
 use super::placing::{Bounds, Placed, Placing};
 use crate::cloud::MAX_LAYERS;
@@ -215,7 +215,7 @@ impl Parts {
                     && is_upper(step.level)
                     && at > 0
                     && is_below(points[at - 1], points[at])
-                    && (range_m[at] - range_m[at - 1]).abs() < SAME_M;
+                    && is_same(range_m[at - 1], range_m[at]);
                 before = if is_roof { before } else { own };
                 if before != NO_PART {
                     extend(&mut self.pieces, before, at as u32, at as u32 + 1);
