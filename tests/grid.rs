@@ -280,6 +280,28 @@ fn what_leaves_disappears_within_a_second_and_what_parks_appears() {
 }
 
 #[test]
+fn a_map_that_began_takes_a_half_of_the_circle_in_at_a_time() {
+    let boxes = [-6.0, 6.0].map(|x| [[x - 0.45, -1.0, 0.0], [x + 0.45, 1.0, 1.5]]);
+    let near_m = boxes.map(|[low, high]| if high[0] < 0.0 { high[0] } else { low[0] });
+    let seen = |drive: &Drive| near_m.map(|x| drive.probability([x, 0.0]) > 0.5);
+    let mut drive = Drive::standing();
+    drive.revolve(&boxes);
+    assert_eq!(seen(&drive), [true; 2]);
+    drive.revolve_for(20, &[]);
+    assert_eq!(seen(&drive), [false; 2]);
+    let before = near_m.map(|x| drive.probability([x, 0.0]));
+    let mut changes = vec![];
+    for _ in 0..4 {
+        drive.revolve(&boxes);
+        let after = near_m.map(|x| drive.probability([x, 0.0]));
+        changes.push([0, 1].map(|side| after[side] > before[side]));
+    }
+    assert_ne!(changes[0][0], changes[0][1]);
+    assert_eq!(changes[1], [true; 2]);
+    assert_eq!(seen(&drive), [true; 2]);
+}
+
+#[test]
 fn what_moves_leaves_no_trail() {
     let mut drive = Drive::standing();
     let car = |step: usize| {

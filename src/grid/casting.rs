@@ -1,5 +1,7 @@
 //! Draws the ways of a revolution's rays into the window.
 
+use std::ops::Range;
+
 use super::evidence::Stretch;
 use super::window::{Window, cell_of};
 use crate::cloud::Scan;
@@ -13,6 +15,8 @@ use crate::ego::Placement;
 /// and between two columns where one's stretches are not the other's.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Casting {
+    /// The first column that is looked at.
+    first: usize,
     /// Between the columns, and on either side of all.
     borders: Vec<Border>,
     ends_m: Vec<f32>,
@@ -72,10 +76,14 @@ impl Casting {
         cell_m: f64,
         window: &mut Window,
     ) {
+        let [Some(first), Some(last)] = [stretches.first(), stretches.last()] else {
+            return;
+        };
         if libm::fabs(scan.step_rad()) > WIDEST_RAD {
             return;
         }
-        self.lay_out(scan, placements, cell_m, window.corner());
+        let columns = first.column..last.column + 1;
+        self.lay_out(columns, scan, placements, cell_m, window.corner());
         // The area of a half turn does not overlap itself, however the sensor moves meanwhile.
         let half = stretches.partition_point(|stretch| stretch.column < scan.columns() / 2);
         let (first, second) = stretches.split_at(half);
@@ -88,7 +96,7 @@ impl Casting {
             for now in half.chunk_by(|a, b| a.column == b.column) {
                 let column = now[0].column;
                 let [left, right] = [column, column + 1]
-                    .map(|border| Corner::at(self.borders[border].at(now[0].to_m)));
+                    .map(|border| Corner::at(self.border(border).at(now[0].to_m)));
                 match reached {
                     Some(reached) if before.len() == 1 && now.len() == 1 => {
                         connect(reached, left, window);
@@ -100,13 +108,20 @@ impl Casting {
                 (before, reached) = (now, Some(right));
             }
             self.outline_between(ends[1], before, &[], window);
-            let [begin, end] = ends.map(|border| self.borders[border].origin);
+            let [begin, end] = ends.map(|border| self.border(border).origin);
             window.outline(begin, end);
             window.pass_outlined();
         }
     }
 
-    fn lay_out(&mut self, scan: &Scan, placements: &[Placement], cell_m: f64, corner: [f64; 2]) {
+    fn lay_out(
+        &mut self,
+        columns: Range<usize>,
+        scan: &Scan,
+        placements: &[Placement],
+        cell_m: f64,
+        corner: [f64; 2],
+    ) {
         // A chord between two such lines meets the ray between them where it ends.
         let aside = libm::tan(0.5 * scan.step_rad());
         let per_cell = 1.0 / cell_m;
@@ -120,17 +135,22 @@ impl Casting {
                 per_metre: [0, 1].map(|axis| (ahead_m[axis] - origin_m[axis]) * per_cell),
             }
         };
-        let columns = scan.columns();
+        self.first = columns.start;
         self.borders.clear();
         self.borders
-            .extend((0..columns).map(|column| border(column, -aside)));
+            .extend(columns.clone().map(|column| border(column, -aside)));
         self.borders
-            .extend(columns.checked_sub(1).map(|last| border(last, aside)));
+            .extend(columns.last().map(|last| border(last, aside)));
+    }
+
+    /// That before a column.
+    fn border(&self, column: usize) -> Border {
+        self.borders[column - self.first]
     }
 
     /// Where a column's stretches but the first begin, and where they end.
     fn outline_across(&self, column: usize, stretches: &[Stretch], window: &mut Window) {
-        let [left, right] = [0, 1].map(|side| self.borders[column + side]);
+        let [left, right] = [0, 1].map(|side| self.border(column + side));
         for stretch in stretches {
             for metres in [stretch.from_m, stretch.to_m] {
                 window.outline(left.at(metres), right.at(metres));
@@ -147,7 +167,7 @@ impl Casting {
         right: &[Stretch],
         window: &mut Window,
     ) {
-        let line = self.borders[border];
+        let line = self.border(border);
         self.ends_m.clear();
         for stretch in left.iter().chain(right) {
             self.ends_m.extend([stretch.from_m, stretch.to_m]);

@@ -1,30 +1,35 @@
 //! From three dimensions to two: what the rays of a column say of the cells below them.
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 
 use super::{GridParameters, NoReturn};
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::float::{greatest, greatest_of, least, least_of};
 use crate::ground::Plane;
-use crate::marks::set_bits;
+use crate::marks::{marked, set_bits};
 
-/// The rays of a revolution over the ground, by columns and layers. From the side a ray is
+/// The rays of some columns over the ground, by columns and layers. From the side a ray is
 /// straight: its height above the ground changes evenly with the horizontal distance.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Evidence {
     /// Height of the sensor.
     sensor_m: f32,
+    /// The columns that are looked at. What is noted of rays is noted of [`BESIDE`] more columns before
+    /// them and behind.
+    columns: Range<usize>,
     /// How far each ray is known to go.
     ends_m: Vec<[f32; MAX_LAYERS]>,
     /// Horizontal distance in which it rises by a metre; negative where it falls.
     runs: Vec<[f32; MAX_LAYERS]>,
-    /// Distance of every return, between the columns beside the first and the last.
+    /// Distance of every return.
     returns_m: Vec<[f32; MAX_LAYERS]>,
     /// Whether each return is an obstacle within reach.
     is_obstacle: Vec<[bool; MAX_LAYERS]>,
-    /// Distance of a column's nearest obstacle, between the columns beside the first and the last.
+    /// Distance of a column's nearest obstacle.
     nearest_m: Vec<f32>,
-    /// How far each ray is known to be free, by itself and by those beside it.
+    /// How far each ray of them is known to be free, by itself and by those beside it.
     free_m: Vec<f32>,
     /// Distance of the nearest obstacle of a column and those beside it.
     before_m: Vec<f32>,
@@ -50,27 +55,32 @@ const BEFORE_RETURN_M: f32 = 0.05;
 const UNSURE_PER_M: f32 = 0.02;
 
 impl Evidence {
-    /// Of every point of the scan whether it is an obstacle within reach.
-    pub(super) fn is_obstacle(&self) -> &[bool] {
-        self.is_obstacle.as_flattened()
+    /// Adds a column that there is not.
+    fn push_none(&mut self) {
+        self.runs.push([0.0; MAX_LAYERS]);
+        self.ends_m.push([0.0; MAX_LAYERS]);
+        self.returns_m.push([NONE_M; MAX_LAYERS]);
+        self.is_obstacle.push([false; MAX_LAYERS]);
+        self.nearest_m.push(NONE_M);
     }
 
-    /// Puts the columns beside the first and the last around them: those on the other side of
-    /// the seam if there is one.
-    fn close(&mut self, is_round: bool) {
-        let columns = self.ends_m.len();
-        for beside in 0..BESIDE {
-            let seam = [
-                (beside, beside + columns),
-                (beside + columns + BESIDE, beside + BESIDE),
-            ];
-            for (at, over) in seam {
-                if is_round && over < self.nearest_m.len() {
-                    self.nearest_m[at] = self.nearest_m[over];
-                    self.returns_m[at] = self.returns_m[over];
-                }
-            }
-        }
+    /// The points that are obstacles within reach, in order.
+    pub(super) fn obstacles(&self) -> impl Iterator<Item = usize> {
+        let own = &self.is_obstacle[BESIDE..BESIDE + self.columns.len()];
+        let first = self.columns.start * MAX_LAYERS;
+        marked(own.as_flattened()).map(move |place| first + place)
+    }
+
+    /// The place of a column among those that are looked at, if it is one of them.
+    fn place(&self, column: usize) -> Option<usize> {
+        let place = column.checked_sub(self.columns.start)?;
+        (place < self.columns.len()).then_some(BESIDE + place)
+    }
+
+    /// Whether a point is an obstacle within reach, of a column that is looked at.
+    pub(super) fn is_obstacle(&self, column: usize, layer: usize) -> bool {
+        self.place(column)
+            .is_some_and(|place| self.is_obstacle[place][layer])
     }
 
     /// How far each ray is known to be free and lower than a height. A single ray that is lost
@@ -78,12 +88,13 @@ impl Evidence {
     #[inline(always)]
     fn look_beside(&mut self, height_m: f32, reach_m: f32) {
         let until_m = height_m - self.sensor_m;
-        let columns = self.ends_m.len();
+        let columns = self.columns.len();
         let layers = columns * MAX_LAYERS;
         let returns_m = self.returns_m.as_flattened();
         let beside: [_; 2 * BESIDE + 1] =
             std::array::from_fn(|column| &returns_m[column * MAX_LAYERS..][..layers]);
-        let (ends_m, runs) = (self.ends_m.as_flattened(), self.runs.as_flattened());
+        let [ends_m, runs] = [&self.ends_m, &self.runs]
+            .map(|rays| &rays.as_flattened()[BESIDE * MAX_LAYERS..][..layers]);
         self.free_m.resize(layers, 0.0);
         let free_m = &mut self.free_m[..layers];
         for ray in 0..layers {
@@ -109,11 +120,12 @@ impl Evidence {
     /// around the sensor, and before the first obstacle where a ray is below the height of what
     /// hangs over the road; behind it only where one came over it and down to the ground again.
     #[inline(always)]
-    fn pass(&self, column: usize, parameters: &GridParameters, passed: &mut Vec<Stretch>) {
+    fn pass(&self, number: usize, parameters: &GridParameters, passed: &mut Vec<Stretch>) {
         let reach_m = parameters.reach_m as f32;
-        let before_m = self.before_m[column];
-        let free_m = &self.free_m.as_chunks::<MAX_LAYERS>().0[column];
-        let runs = &self.runs[column];
+        let before_m = self.before_m[number];
+        let free_m = &self.free_m.as_chunks::<MAX_LAYERS>().0[number];
+        let runs = &self.runs[BESIDE + number];
+        let column = self.columns.start + number;
         let until_m = parameters.obstacle_high_m as f32 - self.sensor_m;
         let mut stretches = Stretches::new(column, parameters.nearest_m as f32, passed);
         if until_m >= 0.0 {
@@ -126,7 +138,7 @@ impl Evidence {
             }
         }
         if before_m < reach_m {
-            self.pass_behind(column, before_m, parameters, &mut stretches);
+            self.pass_behind(BESIDE + number, before_m, parameters, &mut stretches);
         }
         stretches.finish();
     }
@@ -134,18 +146,18 @@ impl Evidence {
     /// What a column's rays passed behind its nearest obstacle.
     fn pass_behind(
         &self,
-        column: usize,
+        place: usize,
         before_m: f32,
         parameters: &GridParameters,
         stretches: &mut Stretches<'_>,
     ) {
-        let returns_m = &self.returns_m[BESIDE + column];
-        let (ends_m, runs) = (&self.ends_m[column], &self.runs[column]);
+        let returns_m = &self.returns_m[place];
+        let (ends_m, runs) = (&self.ends_m[place], &self.runs[place]);
         let until_m = parameters.low_pass_m as f32 - self.sensor_m;
         // A ray below an obstacle that higher rays met goes on under it.
         let mut roofs_m = [parameters.reach_m as f32; MAX_LAYERS];
         for layer in (1..MAX_LAYERS).rev() {
-            let is_obstacle = self.is_obstacle[column][layer];
+            let is_obstacle = self.is_obstacle[place][layer];
             let own_m = if is_obstacle {
                 returns_m[layer]
             } else {
@@ -170,8 +182,11 @@ impl Evidence {
     /// Height below which the lowest of a column's rays that go on beyond a distance is, as far
     /// as that is known. A ray that lands has a known height all along.
     pub(super) fn lowest_pass_m(&self, column: usize, distance_m: f32, ground: &[bool]) -> f32 {
+        let Some(place) = self.place(column) else {
+            return f32::MAX;
+        };
         let ground = &ground.as_chunks::<MAX_LAYERS>().0[column];
-        let (ends_m, runs) = (&self.ends_m[column], &self.runs[column]);
+        let (ends_m, runs) = (&self.ends_m[place], &self.runs[place]);
         let mut passes_m = [f32::MAX; MAX_LAYERS];
         for layer in 0..MAX_LAYERS {
             let unsure_per_m = if ground[layer] { 0.0 } else { UNSURE_PER_M };
@@ -202,10 +217,11 @@ fn below_m(until_m: f32, run: f32) -> f32 {
     if run < 0.0 { NONE_M } else { rises_to_m }
 }
 
-/// Takes a revolution's rays in.
+/// Takes the rays of some columns in.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 pub(super) fn gather(
     evidence: &mut Evidence,
+    columns: Range<usize>,
     scan: &Scan,
     plane: &Plane,
     ground: &[bool],
@@ -234,12 +250,17 @@ pub(super) fn gather(
     }
     evidence.is_obstacle.clear();
     evidence.nearest_m.clear();
-    evidence.nearest_m.extend([NONE_M; BESIDE]);
-    evidence.returns_m.extend([[NONE_M; MAX_LAYERS]; BESIDE]);
+    evidence.columns = columns.clone();
     let ranges_m = scan.range_m().as_chunks::<MAX_LAYERS>().0;
     let heights_m = heights_m.as_chunks::<MAX_LAYERS>().0;
     let ground = ground.as_chunks::<MAX_LAYERS>().0;
-    for (column, ranges_m) in ranges_m.iter().enumerate() {
+    let is_round = scan.sensor().sees_all_round();
+    for number in columns.start..columns.end + 2 * BESIDE {
+        let Some(column) = neighbour(number, scan.columns(), is_round) else {
+            evidence.push_none();
+            continue;
+        };
+        let ranges_m = &ranges_m[column];
         let [sine, cosine] = scan.direction(column);
         let level = normal[0] * sine + normal[1] * cosine;
         let mut runs = [0.0; MAX_LAYERS];
@@ -291,9 +312,20 @@ pub(super) fn gather(
         evidence.is_obstacle.push(is_obstacle);
         evidence.nearest_m.push(least_of(obstacles_m));
     }
-    evidence.nearest_m.extend([NONE_M; BESIDE]);
-    evidence.returns_m.extend([[NONE_M; MAX_LAYERS]; BESIDE]);
-    evidence.close(scan.sensor().sees_all_round());
+}
+
+/// The column with a number counted from [`BESIDE`] before the first one, if there is one: on the
+/// other side of the seam where there is a seam.
+#[inline(always)]
+fn neighbour(number: usize, columns: usize, is_round: bool) -> Option<usize> {
+    match number.checked_sub(BESIDE) {
+        Some(column) if column < columns => Some(column),
+        Some(beyond) if is_round => beyond
+            .checked_sub(columns)
+            .filter(|column| *column < columns),
+        None if is_round => (columns + number).checked_sub(BESIDE),
+        _ => None,
+    }
 }
 
 /// Collects what the rays of every column passed.
@@ -306,8 +338,8 @@ pub(super) fn stretches(
     passed.clear();
     let (high_m, reach_m) = (parameters.obstacle_high_m, parameters.reach_m);
     evidence.look_beside(high_m as f32, reach_m as f32);
-    for column in 0..evidence.ends_m.len() {
-        evidence.pass(column, parameters, passed);
+    for number in 0..evidence.columns.len() {
+        evidence.pass(number, parameters, passed);
     }
 }
 
@@ -375,6 +407,8 @@ impl<'a> Stretches<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cloud::tests::scan_of;
+    use crate::parameter::Profile;
 
     #[test]
     fn stretches_that_meet_become_one() {
@@ -400,25 +434,46 @@ mod tests {
 
     #[test]
     fn columns_beside_the_seam_are_on_either_side_of_it() {
-        let beside = |is_round| {
-            let with = |at: usize| [at as f32; MAX_LAYERS];
-            let mut evidence = Evidence {
-                ends_m: vec![[0.0; MAX_LAYERS]; 10],
-                returns_m: (0..14).map(with).collect(),
-                nearest_m: (0..14).map(|at| at as f32).collect(),
-                ..Evidence::default()
-            };
-            evidence.close(is_round);
-            assert!(
-                evidence
-                    .returns_m
-                    .iter()
-                    .zip(&evidence.nearest_m)
-                    .all(|(a, b)| a[3] == *b)
+        let around = |is_round| [0, 1, 2, 11, 12, 13].map(|number| neighbour(number, 10, is_round));
+        assert_eq!(around(true), [8, 9, 0, 9, 0, 1].map(Some));
+        assert_eq!(around(false), [None, None, Some(0), Some(9), None, None]);
+        assert_eq!([0, 2].map(|number| neighbour(number, 0, true)), [None; 2]);
+    }
+
+    #[test]
+    fn a_part_of_the_columns_is_seen_as_in_the_whole() {
+        // A wall 10 m away behind posts, of which one stands on either side of each end of the part.
+        let scan = scan_of(1800, |column, layer| match column {
+            598..602 | 898..902 if layer < 7 => 300,
+            596 | 604 | 896 | 904 => 0,
+            _ => 1000,
+        });
+        let plane = Plane::level(1.9);
+        let heights_m: Vec<f32> = scan.z_m().iter().map(|z| z + 1.9).collect();
+        let parameters = GridParameters::profile(Profile::Default);
+        let seen_of = |columns: Range<usize>| {
+            let (mut evidence, mut passed) = (Evidence::default(), vec![]);
+            let ground = vec![false; scan.len()];
+            gather(
+                &mut evidence,
+                columns.clone(),
+                &scan,
+                &plane,
+                &ground,
+                &heights_m,
+                &parameters,
             );
-            [0, 1, 12, 13].map(|at| evidence.nearest_m[at])
+            stretches(&mut evidence, &parameters, &mut passed);
+            passed.retain(|stretch| (600..900).contains(&stretch.column));
+            let part = scan.points_of(&(600..900));
+            let mut obstacles: Vec<_> = evidence.obstacles().collect();
+            obstacles.retain(|point| part.contains(point));
+            let is_known = |column| evidence.lowest_pass_m(column, 2.0, &ground) < NONE_M;
+            (passed, obstacles, [599, 600, 899, 900].map(is_known))
         };
-        assert_eq!(beside(true), [10.0, 11.0, 2.0, 3.0]);
-        assert_eq!(beside(false), [0.0, 1.0, 12.0, 13.0]);
+        let (whole, part) = (seen_of(0..1800), seen_of(600..900));
+        assert!(whole.0.len() >= 300 && !whole.1.is_empty());
+        assert_eq!((&whole.0, &whole.1), (&part.0, &part.1));
+        assert_eq!((whole.2, part.2), ([true; 4], [false, true, true, false]));
     }
 }

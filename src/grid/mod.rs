@@ -1,8 +1,8 @@
 //! The occupancy grid: what of the world is static, and what of it is free.
 //!
-//! `evidence` says what the rays of a column mean on the ground, `casting` draws them into the
-//! `window` of cells around the sensor, where each counts once, `model` and `filter` turn that
-//! into log-odds, `map` keeps them in tiles, `updates` chooses the tiles to send. Road users that
+//! A revolution shows a part of the circle: `evidence` says what the rays of its columns mean on the
+//! ground, `casting` draws them into the `window` of cells around the sensor, where each counts once,
+//! `model` and `filter` turn that into log-odds, `map` keeps them in tiles, `updates` chooses the tiles to send. Road users that
 //! move (`moving`) are left to the objects: together the two are the hybrid model that Chen 2021
 //! names in section 2.1.4.
 
@@ -24,10 +24,11 @@ mod window;
 
 pub use map::{Map, TILE_CELLS, Tile};
 
+use std::ops::Range;
+
 use crate::cloud::{CAPACITY, Scan};
 use crate::ego::{Placement, Sweep};
 use crate::ground::Plane;
-use crate::marks::marked;
 use crate::parameter::{choices, parameters};
 use crate::time::Time;
 use crate::track::Object;
@@ -63,13 +64,16 @@ parameters! {
         reach_m: f64 = 50.0, thesis 10.0, in 1.0..=120.0, "m";
         /// Distance from the sensor beyond which the map is forgotten. A cell takes three bytes.
         keep_m: f64 = 200.0, in 5.0..=1000.0, "m";
+        /// In how many revolutions all around the sensor is taken in, a part of the circle in each:
+        /// what stands need not be looked at every time. A map that has just begun takes all in.
+        turns: usize = 2, thesis 1, in 1..=10, "revolutions";
         /// Smallest horizontal distance that the sensor can measure. Cells nearer than this
         /// have a constant low probability.
         nearest_m: f64 = 1.0, in 0.0..=10.0, "m";
         /// Probability that a cell is occupied which a ray passed right before the sensor.
-        free_probability: f64 = 0.3, thesis 0.2, in 0.01..=0.49, "";
+        free_probability: f64 = 0.16, thesis 0.2, in 0.01..=0.49, "";
         /// How much that probability rises with each metre; it ends at one half.
-        free_slope_per_m: f64 = 0.002, thesis 0.02, in 0.0..=0.5, "1/m";
+        free_slope_per_m: f64 = 0.003, thesis 0.02, in 0.0..=0.5, "1/m";
         /// Probability that a cell is occupied in which a ray ended.
         hit_probability: f64 = 0.85, thesis 0.9, in 0.51..=0.99, "";
         /// Probability below which no cell falls, so that what comes to stand there appears
@@ -148,6 +152,9 @@ pub struct Perceived<'a> {
     pub placements: &'a [Placement],
 }
 
+/// Revolutions of a map that begins, each of which is taken in whole.
+const WHOLE: u32 = 10;
+
 impl Grid {
     /// A grid that has seen nothing.
     pub fn new(parameters: &GridParameters) -> Self {
@@ -218,8 +225,10 @@ impl Grid {
         self.map.keep_around(home);
         let half = (self.window.side() / 2) as i32;
         self.window.begin(home.map(|tile| tile - half));
+        let columns = self.columns(scan.columns());
         evidence::gather(
             &mut self.evidence,
+            columns,
             scan,
             plane,
             ground,
@@ -245,6 +254,16 @@ impl Grid {
                 moving::clear_way(object, scan.time(), &mut self.map, cell_m, self.revolution);
             }
         }
+    }
+
+    /// The columns, of so many, that this revolution takes in.
+    fn columns(&self, columns: usize) -> Range<usize> {
+        if self.revolution <= WHOLE {
+            return 0..columns;
+        }
+        let turns = self.parameters.turns;
+        let turn = self.revolution as usize % turns;
+        turn * columns / turns..(turn + 1) * columns / turns
     }
 
     /// A new map where positions before and after cannot be compared.
@@ -288,13 +307,13 @@ impl Grid {
                 sweep,
                 placements,
                 margin_m,
-                self.evidence.is_obstacle(),
+                &self.evidence,
                 &mut self.is_moving,
             );
         }
         self.hits.clear();
         let (per_cell, corner) = (1.0 / self.parameters.cell_m, self.window.corner());
-        for point in marked(self.evidence.is_obstacle()) {
+        for point in self.evidence.obstacles() {
             if self.is_moving[point] {
                 continue;
             }

@@ -1,6 +1,7 @@
 //! Road users that move, for the map to leave them out.
 
 use super::GridParameters;
+use super::evidence::Evidence;
 use super::map::{Map, TILE_CELLS};
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::ego::{Placement, Sweep};
@@ -27,7 +28,7 @@ pub(super) fn mark_returns(
     sweep: &Sweep,
     placements: &[Placement],
     margin_m: f64,
-    is_obstacle: &[bool],
+    evidence: &Evidence,
     is_moving: &mut [bool],
 ) {
     let (sine, cosine) = libm::sincos(object.yaw_rad);
@@ -42,8 +43,9 @@ pub(super) fn mark_returns(
     let outline = object.rectangle().outline();
     for column in (first..first + count).map(|column| scan.over_seam(column)) {
         let age_s = scan.age_s(column);
-        for point in (0..MAX_LAYERS).map(|layer| scan.index(column, layer)) {
-            if is_obstacle[point] {
+        for layer in 0..MAX_LAYERS {
+            let point = scan.index(column, layer);
+            if evidence.is_obstacle(column, layer) {
                 let [x, y, _] = scan.point_m(point).map(f64::from);
                 let [x, y] = placements[column].local_m([x, y]);
                 let at_end = [x + age_s * velocity_mps[0], y + age_s * velocity_mps[1]];
