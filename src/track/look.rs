@@ -16,6 +16,7 @@ pub(super) struct Look {
     pub(super) middle_m: Vector2<f64>,
     /// Mean time before the end of the sweep.
     pub(super) age_s: f64,
+    /// Returns, also those for which others stand.
     pub(super) points: usize,
     pub(super) floor_m: f64,
     pub(super) top_m: f64,
@@ -70,7 +71,7 @@ impl Look {
     /// `spots` must not be empty.
     pub(super) fn at(spots: &[Spot], scan: &Scan, sensor_m: Vector2<f64>) -> Self {
         let count = spots.len() as f64;
-        let (mut sum_m, mut age_s, mut low) = ([0.0; 2], 0.0, 0u32);
+        let (mut sum_m, mut age_s, mut returns, mut low) = ([0.0; 2], 0.0, 0.0, 0u32);
         let (mut lowest_layer, mut highest_layer) = (MAX_LAYERS, 0);
         let (mut floor_m, mut top_m, mut top_point) = (f32::INFINITY, f32::NEG_INFINITY, 0);
         for spot in spots {
@@ -78,6 +79,7 @@ impl Look {
                 *sum_m += f64::from(metres);
             }
             age_s += f64::from(spot.age_s);
+            returns += spot.returns;
             low += u32::from(spot.above_m <= BELT_M);
             floor_m = least(floor_m, spot.above_m);
             let layer = scan.layer(spot.point as usize);
@@ -105,7 +107,7 @@ impl Look {
         Self {
             middle_m,
             age_s: age_s / count,
-            points: spots.len(),
+            points: libm::roundf(returns) as usize,
             floor_m: f64::from(floor_m),
             top_m,
             top_below_m,

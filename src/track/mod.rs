@@ -1,7 +1,7 @@
 //! Step five: clusters become objects that keep their identity from revolution to revolution.
 //!
-//! `objects` takes a revolution in: `patches` takes its clusters with what goes on `above` them, by
-//! `placing` them, what drives along with the sensor over the `seam` of the sweep as one, and
+//! `objects` takes a revolution in: `patches` takes its clusters, after `thinning` them, with what goes
+//! on `above` them, by `placing` them, what drives along with the sensor over the `seam` of the sweep as one, and
 //! divides them into `parts` that do not touch on the `floor`, and `people` side by side;
 //! `grouping` says which `spots` belong together, given what each track `claims` by its `forecast`
 //! and the `strays` near it, `assignment` what is whose, `sight` what is hidden and what is gone;
@@ -62,6 +62,8 @@ mod sight;
 mod spots;
 
 mod strays;
+
+mod thinning;
 
 mod trail;
 
@@ -155,7 +157,7 @@ pub struct Object {
     pub seen_since: Time,
     /// When it was last seen.
     pub last_measured: Time,
-    /// Returns on it in this revolution.
+    /// Returns on it in this revolution; of what is near and shows many, about as many.
     pub points: usize,
 }
 

@@ -227,7 +227,7 @@ impl ObjectTracker {
                 .any(|number| self.places[number].1.contains(middle_m.into()));
             let spots = self.grouping.spots(group);
             // Of a vehicle that is far away a single layer may show the bumper.
-            let may_be_bumper = spots.len() >= BUMPER_RETURNS
+            let may_be_bumper = group.look.points >= BUMPER_RETURNS
                 && group.look.top_below_m > parameters.lowest_object_m;
             let is_low = group.look.top_m < parameters.lowest_object_m && !may_be_bumper;
             if is_piece || is_low || group.look.goes_on > MOST_GOES_ON {

@@ -14,6 +14,8 @@ pub(super) struct Spot {
     pub(super) age_s: f32,
     /// Its place in the scan.
     pub(super) point: u32,
+    /// How many returns it stands for, on average.
+    pub(super) returns: f32,
     /// The group that it belongs to.
     pub(super) group: u32,
 }
@@ -27,6 +29,7 @@ impl Spot {
             above_m: scene.heights_m[point as usize],
             age_s: scene.scan.age_s(column) as f32,
             point,
+            returns: 1.0,
             group,
         }
     }

@@ -138,6 +138,7 @@ mod tests {
             at_m: [0.0; 2],
             above_m: 0.0,
             age_s: 0.0,
+            returns: 1.0,
             point: 0,
             group,
         };

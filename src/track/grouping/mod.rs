@@ -163,6 +163,7 @@ impl Grouping {
                 let group = track.map(|track| track as u32).or(is_whole.then_some(own));
                 if let Some(group) = group.filter(|_| !track.is_some_and(rests)) {
                     let mut spot = Spot::new(scene, placed.point, placed.at_m, group);
+                    spot.returns = patch.returns_each;
                     if placed.is_brought {
                         spot.age_s -= scene.scan.duration_s() as f32;
                     }
