@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::evidence::Stretch;
+use super::stretches::Stretch;
 use super::window::{Window, cell_of};
 use crate::cloud::Scan;
 use crate::ego::Placement;

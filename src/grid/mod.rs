@@ -1,7 +1,7 @@
 //! The occupancy grid: what of the world is static, and what of it is free.
 //!
-//! A revolution shows a part of the circle: `evidence` says what the rays of its columns mean on the
-//! ground, `casting` draws them into the `window` of cells around the sensor, where each counts once,
+//! Of a revolution a part of the circle is taken in: `evidence` says what the rays of its columns mean
+//! on the ground, and on which `stretches` they passed, `casting` draws them into the `window` of cells around the sensor, where each counts once,
 //! `model` and `filter` turn that into log-odds, `map` keeps them in tiles, `updates` chooses the tiles to send. Road users that
 //! move (`moving`) are left to the objects: together the two are the hybrid model that Chen 2021
 //! names in section 2.1.4.
@@ -17,6 +17,8 @@ mod map;
 pub mod model;
 
 mod moving;
+
+mod stretches;
 
 mod updates;
 
@@ -34,9 +36,10 @@ use crate::time::Time;
 use crate::track::Object;
 use crate::wire::grid_tile::GridTile;
 use casting::Casting;
-use evidence::{Evidence, Stretch};
+use evidence::Evidence;
 use filter::{Filter, View};
 use map::HEIGHT_UNIT_M;
+use stretches::Stretch;
 use updates::Updates;
 use window::{Cell, Window};
 

@@ -320,6 +320,22 @@ mod tests {
     }
 
     #[test]
+    fn what_is_thinned_stands_for_all_of_its_returns() {
+        // 10 m away, of which every second column is kept, and the last one.
+        for columns in [10, 100] {
+            let (placer, _) = patches(|column, layer| {
+                u16::from((100..100 + columns).contains(&column) && (4..8).contains(&layer)) * 1000
+            });
+            let [patch] = placer.patches() else {
+                panic!("{:?}", placer.patches());
+            };
+            let kept = placer.placed(patch).len();
+            assert_eq!(kept, if columns == 10 { 40 } else { 4 * 51 });
+            assert!((kept as f32 * patch.returns_each - 4.0 * columns as f32).abs() < 0.01);
+        }
+    }
+
+    #[test]
     fn what_lies_far_behind_the_top_of_a_van_is_no_roof() {
         // 18 m away layer 9 passes 2.8 m above the ground; from column to column it recedes, from
         // 0.25 m to 1.45 m behind what is below.

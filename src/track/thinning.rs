@@ -51,7 +51,12 @@ impl Thinning {
             }
         }
         self.kept = kept;
-        &self.kept
+        // Of what was met in every second column only, by accident or by intent, all may be left out.
+        if self.kept.is_empty() {
+            points
+        } else {
+            &self.kept
+        }
     }
 }
 
@@ -121,6 +126,17 @@ mod tests {
         });
         let parts = [101..=201, 202..=249, 250..=299].map(|part| every(4, part));
         assert_eq!(before, parts.concat());
+    }
+
+    #[test]
+    fn something_is_kept_of_what_the_columns_in_between_do_not_show() {
+        let scan = scan_of(1800, |_, _| 500);
+        let odd = (1..21).step_by(2);
+        let points = odd.flat_map(|column| scan.points_of(&(column..column + 1)));
+        let points: Vec<u32> = points.map(|point| point as u32).collect();
+        let mut thinning = Thinning::default();
+        thinning.begin(&scan);
+        assert_eq!(thinning.thin(&points, scan.range_m()), points);
     }
 
     #[test]
