@@ -94,7 +94,7 @@ const NEAR_M: f32 = 12.0;
 /// What is higher is cut off what may stand below it: crowns of trees, roofs.
 pub(super) const CUT_M: f32 = 2.1;
 /// What is lower joins no parts: grass, kerbs, and what is left of the ground.
-const LOW_M: f32 = 0.2;
+pub(super) const LOW_M: f32 = 0.2;
 /// How far up a wall is looked for, at least and for each metre of range: three layers.
 const ABOVE_CUT_M: f32 = 0.8;
 const ABOVE_CUT_PER_M: f32 = 0.07;

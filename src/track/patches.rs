@@ -87,7 +87,7 @@ impl Placer {
         let highest_m = parameters.highest_object_m as f32;
         for points in clusters.iter() {
             let all = points.len();
-            let points = self.thinning.thin(points, scene.scan.range_m());
+            let points = self.thinning.thin(points, scene);
             let returns_each = all as f32 / points.len() as f32;
             let top_m = self.climber.top_m(points, highest_m, scene.heights_m);
             let is_too_tall = top_m > highest_m;
@@ -321,7 +321,7 @@ mod tests {
 
     #[test]
     fn what_is_thinned_stands_for_all_of_its_returns() {
-        // 10 m away, of which every second column is kept, and the last one.
+        // 10 m away, of which every second column is kept, and the last one, with two ends each.
         for columns in [10, 100] {
             let (placer, _) = patches(|column, layer| {
                 u16::from((100..100 + columns).contains(&column) && (4..8).contains(&layer)) * 1000
@@ -330,7 +330,7 @@ mod tests {
                 panic!("{:?}", placer.patches());
             };
             let kept = placer.placed(patch).len();
-            assert_eq!(kept, if columns == 10 { 40 } else { 4 * 51 });
+            assert_eq!(kept, if columns == 10 { 40 } else { 2 * 51 });
             assert!((kept as f32 * patch.returns_each - 4.0 * columns as f32).abs() < 0.01);
         }
     }

@@ -1,13 +1,16 @@
 //! Fewer returns of what shows many: near the sensor columns are closer together than it takes to know
-//! where something ends.
+//! where something ends, and what stands upright shows the same place once a layer.
 
+use super::Scene;
+use super::parts::{CUT_M, LOW_M};
 use crate::cloud::{MAX_LAYERS, Scan};
+use crate::float::least;
 
-/// Thins the returns of clusters column by column. Its buffers are made once.
+/// Thins the returns of clusters column by column, and within each column. Its buffers are made once.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Thinning {
-    /// Ranges below which one column of two is kept, and one of four.
-    below_m: [f32; 2],
+    /// Ranges below which one column of two is kept, one of four, and one of eight.
+    below_m: [f32; 3],
     kept: Vec<u32>,
 }
 
@@ -15,15 +18,15 @@ pub(super) struct Thinning {
 const MANY: usize = 128;
 /// How far the columns that are kept are apart at most, seen from the sensor.
 const APART_M: f64 = 0.12;
-/// A difference of ranges from one column to the next from which on both are kept: there something
-/// ends, or leads away from the sensor.
+/// A difference of ranges from one return to the next one beside or above it, from which on both are
+/// kept: there something ends, or leads away from the sensor.
 const JUMP_M: f32 = 0.1;
 
 impl Thinning {
     /// Prepares for the returns of a scan.
     pub(super) fn begin(&mut self, scan: &Scan) {
         let step_rad = libm::fabs(scan.step_rad());
-        self.below_m = [2.0, 4.0].map(|columns| {
+        self.below_m = [2.0, 4.0, 8.0].map(|columns| {
             let below_m = APART_M / (columns * step_rad);
             if step_rad > 0.0 { below_m as f32 } else { 0.0 }
         });
@@ -31,61 +34,106 @@ impl Thinning {
 
     /// Of how many columns one is kept at a range.
     fn columns(&self, range_m: f32) -> u32 {
-        let [two, four] = self.below_m.map(|below_m| u32::from(range_m < below_m));
-        1 << (two + four)
+        let halvings = self.below_m.iter().filter(|below_m| range_m < **below_m);
+        1 << halvings.count()
     }
 
-    /// The points of a cluster that are kept, given the ranges of all points of the scan.
-    pub(super) fn thin<'a>(&'a mut self, points: &'a [u32], range_m: &[f32]) -> &'a [u32] {
+    /// The points of a cluster that are kept.
+    pub(super) fn thin<'a>(&'a mut self, points: &'a [u32], scene: &Scene<'_>) -> &'a [u32] {
         if points.len() < MANY {
             return points;
         }
         let mut kept = std::mem::take(&mut self.kept);
         kept.clear();
-        let column = |point: &u32| point / MAX_LAYERS as u32;
-        for own in points.chunk_by(|a, b| column(a) == column(b)) {
-            let point = own[own.len() / 2] as usize;
-            let columns = self.columns(range_m[point]);
-            if column(&own[0]).is_multiple_of(columns) || jumps(point, range_m) {
-                kept.extend_from_slice(own);
+        let mut before = None;
+        let mut columns = columns(points, scene.scan.range_m()).peekable();
+        while let Some(column) = columns.next() {
+            let goes_on = |beside: Option<&Column<'_>>| {
+                beside.is_some_and(|beside| column.is_continued_by(beside))
+            };
+            let is_end = !goes_on(before.as_ref()) || !goes_on(columns.peek());
+            if is_end || column.number.is_multiple_of(self.columns(column.nearest_m)) {
+                keep_ends(column.points, scene, &mut kept);
             }
+            before = Some(column);
         }
         self.kept = kept;
-        // Of what was met in every second column only, by accident or by intent, all may be left out.
-        if self.kept.is_empty() {
-            points
-        } else {
-            &self.kept
-        }
+        &self.kept
     }
 }
 
-/// Whether the next column on either side shows something else beside a point.
-fn jumps(point: usize, range_m: &[f32]) -> bool {
-    let is_beside = |other: Option<usize>| {
-        let beside_m = other.and_then(|other| range_m.get(other));
-        beside_m.is_some_and(|beside_m| (beside_m - range_m[point]).abs() < JUMP_M)
+/// What a column shows of a cluster.
+#[derive(Debug, Clone, Copy)]
+struct Column<'a> {
+    number: u32,
+    points: &'a [u32],
+    /// Least of their ranges: rays pass through panes here and there, but not through all of a body.
+    nearest_m: f32,
+}
+
+impl Column<'_> {
+    /// Whether another one is the next one on either side, and shows the same.
+    fn is_continued_by(&self, other: &Self) -> bool {
+        let apart_m = (self.nearest_m - other.nearest_m).abs();
+        self.number.abs_diff(other.number) == 1 && apart_m < JUMP_M
+    }
+}
+
+/// The columns of a cluster.
+fn columns<'a>(points: &'a [u32], range_m: &[f32]) -> impl Iterator<Item = Column<'a>> {
+    let number = |point: &u32| point / MAX_LAYERS as u32;
+    let columns = points.chunk_by(move |a, b| number(a) == number(b));
+    columns.map(move |points| {
+        let ranges_m = points.iter().map(|point| range_m[*point as usize]);
+        Column {
+            number: number(&points[0]),
+            points,
+            nearest_m: ranges_m.fold(f32::INFINITY, least),
+        }
+    })
+}
+
+/// Keeps the ends of every stretch of a column that stands upright, be it grass or a body, and all that
+/// is above the cut: whether a roof is whose is told from return to return.
+fn keep_ends(points: &[u32], scene: &Scene<'_>, kept: &mut Vec<u32>) {
+    let (range_m, heights_m) = (scene.scan.range_m(), scene.heights_m);
+    let is_continued_above = |point: usize| {
+        let apart_m = (range_m[point + 1] - range_m[point]).abs();
+        let [low_m, high_m] = [heights_m[point], heights_m[point + 1]];
+        apart_m < JUMP_M && high_m <= CUT_M && (low_m < LOW_M) == (high_m < LOW_M)
     };
-    let (before, after) = (point.checked_sub(MAX_LAYERS), point + MAX_LAYERS);
-    !is_beside(before) || !is_beside(Some(after))
+    let mut from_below = false;
+    for (place, point) in points.iter().enumerate() {
+        let has_next = points.get(place + 1) == Some(&(point + 1));
+        let to_above = has_next && is_continued_above(*point as usize);
+        if !(from_below && to_above) {
+            kept.push(*point);
+        }
+        from_below = to_above;
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::cloud::tests::scan_of;
+    use crate::track::tests::with_scene;
+
+    /// The points that are kept of those that are chosen.
+    fn kept_of(scan: &Scan, is_chosen: impl Fn(usize) -> bool) -> Vec<u32> {
+        let met = (0..scan.len()).filter(|point| scan.range_m()[*point] > 0.0 && is_chosen(*point));
+        let met: Vec<u32> = met.map(|point| point as u32).collect();
+        let mut thinning = Thinning::default();
+        thinning.begin(scan);
+        with_scene(scan, |scene| thinning.thin(&met, scene).to_vec())
+    }
 
     /// The columns that are kept of those that have a return in one layer, given its range.
     fn kept(range_cm: impl Fn(usize) -> u16) -> Vec<u32> {
         let scan = scan_of(1800, |column, layer| {
             u16::from(layer == 7) * range_cm(column)
         });
-        let points = (0..1800).map(|column| scan.index(column, 7));
-        let met = points.filter(|point| scan.range_m()[*point] > 0.0);
-        let met: Vec<u32> = met.map(|point| point as u32).collect();
-        let mut thinning = Thinning::default();
-        thinning.begin(&scan);
-        let kept = thinning.thin(&met, scan.range_m());
+        let kept = kept_of(&scan, |_| true);
         kept.iter().map(|point| point / MAX_LAYERS as u32).collect()
     }
 
@@ -100,7 +148,7 @@ mod tests {
 
     #[test]
     fn columns_are_kept_that_are_no_farther_apart_than_twelve_centimetres_and_both_ends() {
-        for (range_m, columns) in [(1, 4), (8, 4), (9, 2), (17, 2), (18, 1)] {
+        for (range_m, columns) in [(1, 8), (4, 8), (5, 4), (8, 4), (9, 2), (17, 2), (18, 1)] {
             let kept = kept(|column| u16::from((101..300).contains(&column)) * 100 * range_m);
             assert_eq!(kept, every(columns, 101..=299), "{range_m} m");
             assert!(f64::from(columns) * f64::from(range_m) * 0.2_f64.to_radians() < APART_M);
@@ -110,7 +158,7 @@ mod tests {
     #[test]
     fn what_shows_few_returns_is_kept_whole() {
         let kept = |count| kept(|column| u16::from(column < count) * 200).len();
-        assert_eq!((kept(MANY - 1), kept(MANY)), (MANY - 1, MANY / 4 + 1));
+        assert_eq!((kept(MANY - 1), kept(MANY)), (MANY - 1, MANY / 8 + 1));
     }
 
     #[test]
@@ -120,7 +168,7 @@ mod tests {
         assert_eq!(away(15).len(), 200);
         assert!(away(5).len() < 110);
         let before = kept(|column| match column {
-            202..=249 => 400,
+            202..=249 => 450,
             101..=299 => 500,
             _ => 0,
         });
@@ -129,14 +177,44 @@ mod tests {
     }
 
     #[test]
-    fn something_is_kept_of_what_the_columns_in_between_do_not_show() {
-        let scan = scan_of(1800, |_, _| 500);
-        let odd = (1..21).step_by(2);
-        let points = odd.flat_map(|column| scan.points_of(&(column..column + 1)));
-        let points: Vec<u32> = points.map(|point| point as u32).collect();
-        let mut thinning = Thinning::default();
-        thinning.begin(&scan);
-        assert_eq!(thinning.thin(&points, scan.range_m()), points);
+    fn columns_that_stand_alone_are_all_kept() {
+        let scan = scan_of(1800, |_, layer| u16::from(layer < 3) * 500);
+        let odd = |point: usize| scan.column(point) < 160 && scan.column(point) % 2 == 1;
+        let kept = kept_of(&scan, odd);
+        assert_eq!(kept.len(), 80 * 2);
+    }
+
+    #[test]
+    fn what_is_seen_through_panes_leaves_the_body_around_them_whole() {
+        // Every third ray of the upper layers passes through to the other side.
+        let scan = scan_of(1800, |column, layer| match (column, layer) {
+            (100..200, 4..7) => 600,
+            (100..200, 7..9) => 600 + 200 * u16::from(column % 3 == 0),
+            _ => 0,
+        });
+        let kept = kept_of(&scan, |_| true);
+        let kept = kept.chunk_by(|a, b| a / MAX_LAYERS as u32 == b / MAX_LAYERS as u32);
+        let columns: Vec<u32> = kept.map(|own| own[0] / MAX_LAYERS as u32).collect();
+        assert_eq!(columns, every(4, 100..=199));
+    }
+
+    #[test]
+    fn of_what_stands_upright_the_ends_are_kept_and_what_is_beside_a_gap_or_a_cut() {
+        // 6 m away and from 1.9 m above the ground layers 0 to 9 pass 0.35, 0.55, 0.75, 0.96, 1.17,
+        // 1.38, 1.59, 1.80, 2.00 and 2.21 m above the ground.
+        let layers = |is_met: fn(usize) -> bool, farther_cm: fn(usize) -> u16| {
+            let scan = scan_of(1800, |column, layer| {
+                u16::from(column < 100 && is_met(layer)) * (600 + farther_cm(layer))
+            });
+            let kept = kept_of(&scan, |_| true);
+            let first = kept.iter().filter(|point| **point < MAX_LAYERS as u32);
+            first.copied().collect::<Vec<_>>()
+        };
+        assert_eq!(layers(|layer| layer < 8, |_| 0), [0, 7]);
+        assert_eq!(layers(|layer| layer < 12, |_| 0), [0, 8, 9, 10, 11]);
+        assert_eq!(layers(|layer| layer < 8 && layer != 4, |_| 0), [0, 3, 5, 7]);
+        let step = |layer| 30 * u16::from(layer > 2);
+        assert_eq!(layers(|layer| layer < 8, step), [0, 2, 3, 7]);
     }
 
     #[test]
