@@ -11,7 +11,20 @@ use crate::float::least;
 pub(super) struct Thinning {
     /// Ranges below which one column of two is kept, one of four, and one of eight.
     below_m: [f32; 3],
+    /// Those of the cluster that is thinned.
+    columns: Vec<Column>,
     kept: Vec<u32>,
+}
+
+/// What a column shows of a cluster.
+#[derive(Debug, Clone, Copy)]
+struct Column {
+    number: u32,
+    /// Where its points stand among those of the cluster.
+    begin: u32,
+    end: u32,
+    /// Least of their ranges: rays pass through panes here and there, but not through all of a body.
+    nearest_m: f32,
 }
 
 /// Clusters of fewer returns are kept whole: people, and what is far away.
@@ -33,7 +46,7 @@ impl Thinning {
     }
 
     /// Of how many columns one is kept at a range.
-    fn columns(&self, range_m: f32) -> u32 {
+    fn columns_at(&self, range_m: f32) -> u32 {
         let halvings = self.below_m.iter().filter(|below_m| range_m < **below_m);
         1 << halvings.count()
     }
@@ -43,74 +56,78 @@ impl Thinning {
         if points.len() < MANY {
             return points;
         }
-        let mut kept = std::mem::take(&mut self.kept);
-        kept.clear();
-        let mut before = None;
-        let mut columns = columns(points, scene.scan.range_m()).peekable();
-        while let Some(column) = columns.next() {
-            let goes_on = |beside: Option<&Column<'_>>| {
-                beside.is_some_and(|beside| column.is_continued_by(beside))
-            };
-            let is_end = !goes_on(before.as_ref()) || !goes_on(columns.peek());
-            if is_end || column.number.is_multiple_of(self.columns(column.nearest_m)) {
-                keep_ends(column.points, scene, &mut kept);
+        let (range_m, heights_m) = (scene.scan.range_m(), scene.heights_m);
+        self.find_columns(points, range_m);
+        self.kept.clear();
+        let mut is_continued_before = false;
+        for (place, column) in self.columns.iter().enumerate() {
+            let behind = self.columns.get(place + 1);
+            let is_continued_behind = behind.is_some_and(|behind| column.is_continued_by(behind));
+            let is_end = !(is_continued_before && is_continued_behind);
+            if is_end
+                || column
+                    .number
+                    .is_multiple_of(self.columns_at(column.nearest_m))
+            {
+                let own = &points[column.begin as usize..column.end as usize];
+                keep_ends(own, range_m, heights_m, &mut self.kept);
             }
-            before = Some(column);
+            is_continued_before = is_continued_behind;
         }
-        self.kept = kept;
         &self.kept
     }
-}
 
-/// What a column shows of a cluster.
-#[derive(Debug, Clone, Copy)]
-struct Column<'a> {
-    number: u32,
-    points: &'a [u32],
-    /// Least of their ranges: rays pass through panes here and there, but not through all of a body.
-    nearest_m: f32,
-}
-
-impl Column<'_> {
-    /// Whether another one is the next one on either side, and shows the same.
-    fn is_continued_by(&self, other: &Self) -> bool {
-        let apart_m = (self.nearest_m - other.nearest_m).abs();
-        self.number.abs_diff(other.number) == 1 && apart_m < JUMP_M
+    /// Finds what each column shows of a cluster.
+    fn find_columns(&mut self, points: &[u32], range_m: &[f32]) {
+        self.columns.clear();
+        let mut end = 0;
+        for own in points.chunk_by(|a, b| number_of(*a) == number_of(*b)) {
+            let begin = end;
+            end += own.len() as u32;
+            let ranges_m = own.iter().map(|point| range_m[*point as usize]);
+            self.columns.push(Column {
+                number: number_of(own[0]),
+                begin,
+                end,
+                nearest_m: ranges_m.fold(f32::INFINITY, least),
+            });
+        }
     }
 }
 
-/// The columns of a cluster.
-fn columns<'a>(points: &'a [u32], range_m: &[f32]) -> impl Iterator<Item = Column<'a>> {
-    let number = |point: &u32| point / MAX_LAYERS as u32;
-    let columns = points.chunk_by(move |a, b| number(a) == number(b));
-    columns.map(move |points| {
-        let ranges_m = points.iter().map(|point| range_m[*point as usize]);
-        Column {
-            number: number(&points[0]),
-            points,
-            nearest_m: ranges_m.fold(f32::INFINITY, least),
-        }
-    })
+/// The number of a point's column.
+fn number_of(point: u32) -> u32 {
+    point / MAX_LAYERS as u32
+}
+
+impl Column {
+    /// Whether another one is the next one, and shows the same.
+    fn is_continued_by(&self, next: &Self) -> bool {
+        let apart_m = (self.nearest_m - next.nearest_m).abs();
+        self.number + 1 == next.number && apart_m < JUMP_M
+    }
 }
 
 /// Keeps the ends of every stretch of a column that stands upright, be it grass or a body, and all that
 /// is above the cut: whether a roof is whose is told from return to return.
-fn keep_ends(points: &[u32], scene: &Scene<'_>, kept: &mut Vec<u32>) {
-    let (range_m, heights_m) = (scene.scan.range_m(), scene.heights_m);
-    let is_continued_above = |point: usize| {
-        let apart_m = (range_m[point + 1] - range_m[point]).abs();
-        let [low_m, high_m] = [heights_m[point], heights_m[point + 1]];
-        apart_m < JUMP_M && high_m <= CUT_M && (low_m < LOW_M) == (high_m < LOW_M)
+fn keep_ends(points: &[u32], range_m: &[f32], heights_m: &[f32], kept: &mut Vec<u32>) {
+    let Some((first, others)) = points.split_first() else {
+        return;
     };
-    let mut from_below = false;
-    for (place, point) in points.iter().enumerate() {
-        let has_next = points.get(place + 1) == Some(&(point + 1));
-        let to_above = has_next && is_continued_above(*point as usize);
-        if !(from_below && to_above) {
-            kept.push(*point);
+    let seen = |point: u32| (range_m[point as usize], heights_m[point as usize]);
+    let (mut below, mut below_m, mut is_continued_below) = (*first, seen(*first), false);
+    for point in others {
+        let own_m = seen(*point);
+        let is_continued = below + 1 == *point
+            && (own_m.0 - below_m.0).abs() < JUMP_M
+            && own_m.1 <= CUT_M
+            && (own_m.1 < LOW_M) == (below_m.1 < LOW_M);
+        if !(is_continued_below && is_continued) {
+            kept.push(below);
         }
-        from_below = to_above;
+        (below, below_m, is_continued_below) = (*point, own_m, is_continued);
     }
+    kept.push(below);
 }
 
 #[cfg(test)]
@@ -221,6 +238,6 @@ mod tests {
     fn columns_without_a_step_are_all_kept() {
         let mut thinning = Thinning::default();
         thinning.begin(&Scan::default());
-        assert_eq!(thinning.columns(1.0), 1);
+        assert_eq!(thinning.columns_at(1.0), 1);
     }
 }

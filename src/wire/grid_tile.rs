@@ -1,6 +1,8 @@
 //! A tile of the occupancy grid as it travels.
 
 use super::message::Bytes;
+use super::protobuf::put_varint;
+use crate::marks::marked;
 
 /// Levels of occupancy on either side of the unknown one.
 pub const LEVELS: i16 = 7;
@@ -85,33 +87,46 @@ pub enum TileError {
     },
 }
 
+/// Cells of a row of which the differences are found together.
+const AT_ONCE: usize = 64;
+
 /// Writes the levels of a tile's cells, from -[`LEVELS`] to [`LEVELS`], rows of `side` cells.
 pub fn encode_cells(levels: &[i16], side: usize, out: &mut Vec<u8>) {
     out.clear();
-    let (mut difference, mut count) = (0, 0);
-    let mut south: Option<&[i16]> = None;
-    for row in levels.chunks(side) {
-        let is_same = match south {
-            Some(south) => row == south,
-            None => row.iter().all(|level| *level == 0),
-        };
-        if difference == 0 && is_same {
-            count += side as u64;
-            south = Some(row);
-            continue;
-        }
-        for (at, level) in row.iter().enumerate() {
-            let south = south.map_or(0, |south| south[at]);
-            let next = ((level - south) & 15) as u64;
-            if next != difference && count > 0 {
-                super::protobuf::put_varint(out, count << 4 | difference);
-                count = 0;
+    let mut put = |difference: u8, cells: usize| {
+        put_varint(out, (cells as u64) << 4 | u64::from(difference));
+    };
+    let (mut difference, mut begin) = (0, 0);
+    for first_of_row in (0..levels.len()).step_by(side) {
+        let row = &levels[first_of_row..levels.len().min(first_of_row + side)];
+        for (cells, first) in row.chunks(AT_ONCE).zip((first_of_row..).step_by(AT_ONCE)) {
+            let souths = first.checked_sub(side).map(|first| &levels[first..]);
+            let differences = differences(cells, souths);
+            let mut changes = [false; AT_ONCE];
+            changes[0] = differences[0] != difference;
+            for (change, pair) in changes[1..].iter_mut().zip(differences.windows(2)) {
+                *change = pair[0] != pair[1];
             }
-            (difference, count) = (next, count + 1);
+            for at in marked(&changes[..cells.len()]) {
+                if first + at > begin {
+                    put(difference, first + at - begin);
+                }
+                (difference, begin) = (differences[at], first + at);
+            }
         }
-        south = Some(row);
     }
-    super::protobuf::put_varint(out, count << 4 | difference);
+    put(difference, levels.len() - begin);
+}
+
+/// What a run says of each of some cells: how much higher it is than that to the south, modulo 16.
+fn differences(cells: &[i16], souths: Option<&[i16]>) -> [u8; AT_ONCE] {
+    let padded = |levels: &[i16]| {
+        let mut padded = [0; AT_ONCE];
+        padded[..cells.len()].copy_from_slice(&levels[..cells.len()]);
+        padded
+    };
+    let (own, souths) = (padded(cells), souths.map_or([0; AT_ONCE], padded));
+    std::array::from_fn(|at| (own[at] - souths[at]) as u8 & 15)
 }
 
 impl GridTile {
