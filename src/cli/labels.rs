@@ -1,4 +1,4 @@
-//! `labels.npz`: one int32 array [columns][layers] a revolution, for numpy.
+//! `labels.npz`: one int32 array `[columns][layers]` a revolution, for numpy.
 
 use std::path::Path;
 

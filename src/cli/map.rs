@@ -8,7 +8,7 @@ use super::npz::Archive;
 use crate::grid::{Grid, TILE_CELLS, Tile, model};
 use crate::simulate::map::TrueMap;
 
-/// Writes a true map: `cells` [rows][columns] from the south-west, bits of
+/// Writes a true map: `cells[rows][columns]` from the south-west, bits of
 /// [`crate::simulate::map::cell`].
 pub(super) fn write_truth(path: &Path, map: &TrueMap) -> Result<()> {
     let mut archive = Archive::create(path)?;
@@ -18,7 +18,7 @@ pub(super) fn write_truth(path: &Path, map: &TrueMap) -> Result<()> {
     archive.finish()
 }
 
-/// Writes the map as it is: `probability` [rows][columns] from the south-west, 0.5 unknown,
+/// Writes the map as it is: `probability[rows][columns]` from the south-west, 0.5 unknown,
 /// `origin` of that corner, and the `cell` size.
 pub(super) fn write(path: &Path, grid: &Grid) -> Result<()> {
     let places = || grid.map().tiles().map(Tile::place);

@@ -2,8 +2,8 @@
 //! above most road users.
 //!
 //! DBSCAN (Ester et al. 1996) without a tree: the array is sorted by azimuth and elevation
-//! already, so that the neighbours of a point stand in a few columns of it. What is clustered is put
-//! into `rows` without gaps, one for each layer. `density` counts the neighbours close by, which is
+//! already, so that the neighbours of a point stand in a few columns of it. `filling` puts what is
+//! clustered into `rows` without gaps, one for each layer. `density` counts the neighbours close by, which is
 //! enough for most points; `window` says in which columns and layers all others can be, and `search`
 //! compares a point with what stands there; `dbscan` is the algorithm. `joining` says which core
 //! points belong together: those that follow each other are `runs`, those that meet are `sets` of
@@ -14,6 +14,8 @@ mod boxes;
 mod dbscan;
 
 mod density;
+
+mod filling;
 
 mod joining;
 
