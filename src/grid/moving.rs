@@ -112,7 +112,72 @@ pub(super) fn clear_way(object: &Object, now: Time, map: &mut Map, cell_m: f64, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::Tile;
     use crate::track::Class;
+
+    /// A road user that was seen for the first time.
+    fn object(length_m: f64, width_m: f64) -> Object {
+        let now = Time::from_micros(1_700_000_000_000_000);
+        Object {
+            id: 1,
+            class: Class::Cyclist,
+            class_probability: 0.9,
+            measured: true,
+            centre_m: [-0.005, -0.005, 0.0],
+            yaw_rad: 0.0,
+            speed_mps: 5.0,
+            yaw_rate_radps: 0.0,
+            length_m,
+            width_m,
+            height_m: 1.5,
+            position_deviation_m: [0.1; 2],
+            yaw_deviation_rad: 0.1,
+            speed_deviation_mps: 0.1,
+            existence: 0.9,
+            first_seen: now,
+            seen_since: now,
+            last_measured: now,
+            points: 9,
+        }
+    }
+
+    #[test]
+    fn only_what_is_occupied_in_a_box_that_is_turned_is_cleared() {
+        const SIDE: i32 = TILE_CELLS as i32;
+        let object = Object {
+            yaw_rad: 0.5,
+            ..object(1.2, 0.4)
+        };
+        let mut way = object.rectangle();
+        way.length_m += 2.0 * EDGE_M;
+        way.width_m += 2.0 * EDGE_M;
+        let outline = way.outline();
+        for [x, y] in (-12..12).flat_map(|y| (-12..12).map(move |x| [x, y])) {
+            let mut map = Map::new(8);
+            for place in [[-1, -1], [0, -1], [-1, 0], [0, 0]] {
+                map.tile_mut(place).log_odds.fill(-900);
+            }
+            let place = [x, y].map(|at: i32| at.div_euclid(SIDE));
+            let [column, row] = [x, y].map(|at: i32| at.rem_euclid(SIDE) as usize);
+            let cell = row * TILE_CELLS + column;
+            map.tile_mut(place).log_odds[cell] = 900;
+            clear_way(&object, object.seen_since, &mut map, 0.1, 3);
+            let middle_m = [x, y].map(|at| (f64::from(at) + 0.5) * 0.1);
+            let left = if outline.distance_m(middle_m) <= 0.0 {
+                0
+            } else {
+                900
+            };
+            let log_odds = |tile: &Tile| tile.log_odds().to_vec();
+            assert_eq!(
+                map.tile(place).map(log_odds).unwrap()[cell],
+                left,
+                "{x} {y}"
+            );
+            let others = map.tiles().flat_map(log_odds);
+            assert_eq!(others.filter(|log_odds| *log_odds != -900).count(), 1);
+        }
+    }
 
     #[test]
     fn a_way_is_cleared_up_to_its_edges_in_all_known_tiles_that_it_meets() {
@@ -125,29 +190,9 @@ mod tests {
                 map.tile_mut(*place).log_odds.fill(900);
             }
         }
-        let now = Time::from_micros(1_700_000_000_000_000);
         // With its unsure edges from -6.98 m to 6.97 m, and from -0.98 m to 0.97 m.
-        let object = Object {
-            id: 1,
-            class: Class::Cyclist,
-            class_probability: 0.9,
-            measured: true,
-            centre_m: [-0.005, -0.005, 0.0],
-            yaw_rad: 0.0,
-            speed_mps: 5.0,
-            yaw_rate_radps: 0.0,
-            length_m: 13.55,
-            width_m: 1.55,
-            height_m: 1.5,
-            position_deviation_m: [0.1; 2],
-            yaw_deviation_rad: 0.1,
-            speed_deviation_mps: 0.1,
-            existence: 0.9,
-            first_seen: now,
-            seen_since: now,
-            last_measured: now,
-            points: 9,
-        };
+        let object = object(13.55, 1.55);
+        let now = object.seen_since;
         clear_way(&object, now, &mut map, 0.1, 3);
         assert!(map.tile([-2, -1]).is_none());
         for tile in map.tiles() {

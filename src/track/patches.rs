@@ -336,6 +336,18 @@ mod tests {
     }
 
     #[test]
+    fn a_wall_that_is_passed_closely_stays_one_part() {
+        for beside_cm in [80.0, 100.0, 120.0] {
+            let (placer, _) = patches(|column, layer| {
+                let range_cm = beside_cm / libm::sin((column as f64 * 0.2).to_radians());
+                let is_met = (1..450).contains(&column) && range_cm < 850.0;
+                u16::from(is_met && (5..8).contains(&layer)) * range_cm as u16
+            });
+            assert_eq!(placer.patches().len(), 1, "{beside_cm} cm");
+        }
+    }
+
+    #[test]
     fn what_lies_far_behind_the_top_of_a_van_is_no_roof() {
         // 18 m away layer 9 passes 2.8 m above the ground; from column to column it recedes, from
         // 0.25 m to 1.45 m behind what is below.

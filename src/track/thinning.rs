@@ -9,8 +9,8 @@ use crate::float::least;
 /// Thins the returns of clusters column by column, and within each column. Its buffers are made once.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Thinning {
-    /// Ranges below which one column of two is kept, one of four, and one of eight.
-    below_m: [f32; 3],
+    /// Ranges below which one column of two is kept, and one of four.
+    below_m: [f32; 2],
     /// Those of the cluster that is thinned.
     columns: Vec<Column>,
     kept: Vec<u32>,
@@ -25,21 +25,25 @@ struct Column {
     end: u32,
     /// Least of their ranges: rays pass through panes here and there, but not through all of a body.
     nearest_m: f32,
+    /// The layer of the highest one: what stands behind something nearer is higher, or is not seen.
+    top: u32,
 }
 
 /// Clusters of fewer returns are kept whole: people, and what is far away.
 const MANY: usize = 128;
-/// How far the columns that are kept are apart at most, seen from the sensor.
+/// How far the columns that are kept are apart at most, across the line of sight: two columns at least
+/// show a head (`people`).
 const APART_M: f64 = 0.12;
-/// A difference of ranges from one return to the next one beside or above it, from which on both are
-/// kept: there something ends, or leads away from the sensor.
+/// A difference of ranges from which on two returns of a column, one above the other, or the nearest
+/// ones of two columns are kept: there something ends, or leads away from the sensor. With the width
+/// of the columns between them it is less than a cell of which parts consist.
 const JUMP_M: f32 = 0.1;
 
 impl Thinning {
     /// Prepares for the returns of a scan.
     pub(super) fn begin(&mut self, scan: &Scan) {
         let step_rad = libm::fabs(scan.step_rad());
-        self.below_m = [2.0, 4.0, 8.0].map(|columns| {
+        self.below_m = [2.0, 4.0].map(|columns| {
             let below_m = APART_M / (columns * step_rad);
             if step_rad > 0.0 { below_m as f32 } else { 0.0 }
         });
@@ -51,7 +55,7 @@ impl Thinning {
         1 << halvings.count()
     }
 
-    /// The points of a cluster that are kept.
+    /// The points of a cluster that are kept, in the order of the scan, as they are given.
     pub(super) fn thin<'a>(&'a mut self, points: &'a [u32], scene: &Scene<'_>) -> &'a [u32] {
         if points.len() < MANY {
             return points;
@@ -59,20 +63,20 @@ impl Thinning {
         let (range_m, heights_m) = (scene.scan.range_m(), scene.heights_m);
         self.find_columns(points, range_m);
         self.kept.clear();
-        let mut is_continued_before = false;
+        let (mut is_begin, mut kept_m) = (true, f32::INFINITY);
         for (place, column) in self.columns.iter().enumerate() {
-            let behind = self.columns.get(place + 1);
-            let is_continued_behind = behind.is_some_and(|behind| column.is_continued_by(behind));
-            let is_end = !(is_continued_before && is_continued_behind);
-            if is_end
-                || column
-                    .number
-                    .is_multiple_of(self.columns_at(column.nearest_m))
-            {
+            let next = self.columns.get(place + 1);
+            let is_end = next.is_none_or(|next| !column.is_continued_by(next));
+            let leads_away = (column.nearest_m - kept_m).abs() >= JUMP_M;
+            let is_due = column
+                .number
+                .is_multiple_of(self.columns_at(column.nearest_m));
+            if is_begin || is_end || leads_away || is_due {
                 let own = &points[column.begin as usize..column.end as usize];
                 keep_ends(own, range_m, heights_m, &mut self.kept);
+                kept_m = column.nearest_m;
             }
-            is_continued_before = is_continued_behind;
+            is_begin = is_end;
         }
         &self.kept
     }
@@ -90,6 +94,7 @@ impl Thinning {
                 begin,
                 end,
                 nearest_m: ranges_m.fold(f32::INFINITY, least),
+                top: own[own.len() - 1] % MAX_LAYERS as u32,
             });
         }
     }
@@ -104,7 +109,7 @@ impl Column {
     /// Whether another one is the next one, and shows the same.
     fn is_continued_by(&self, next: &Self) -> bool {
         let apart_m = (self.nearest_m - next.nearest_m).abs();
-        self.number + 1 == next.number && apart_m < JUMP_M
+        self.number + 1 == next.number && apart_m < JUMP_M && self.top.abs_diff(next.top) <= 1
     }
 }
 
@@ -151,7 +156,7 @@ mod tests {
             u16::from(layer == 7) * range_cm(column)
         });
         let kept = kept_of(&scan, |_| true);
-        kept.iter().map(|point| point / MAX_LAYERS as u32).collect()
+        kept.iter().map(|point| number_of(*point)).collect()
     }
 
     /// Some columns with their ends.
@@ -165,7 +170,7 @@ mod tests {
 
     #[test]
     fn columns_are_kept_that_are_no_farther_apart_than_twelve_centimetres_and_both_ends() {
-        for (range_m, columns) in [(1, 8), (4, 8), (5, 4), (8, 4), (9, 2), (17, 2), (18, 1)] {
+        for (range_m, columns) in [(1, 4), (8, 4), (9, 2), (17, 2), (18, 1)] {
             let kept = kept(|column| u16::from((101..300).contains(&column)) * 100 * range_m);
             assert_eq!(kept, every(columns, 101..=299), "{range_m} m");
             assert!(f64::from(columns) * f64::from(range_m) * 0.2_f64.to_radians() < APART_M);
@@ -175,17 +180,18 @@ mod tests {
     #[test]
     fn what_shows_few_returns_is_kept_whole() {
         let kept = |count| kept(|column| u16::from(column < count) * 200).len();
-        assert_eq!((kept(MANY - 1), kept(MANY)), (MANY - 1, MANY / 8 + 1));
+        assert_eq!((kept(MANY - 1), kept(MANY)), (MANY - 1, MANY / 4 + 1));
     }
 
     #[test]
     fn what_leads_away_is_kept_whole_and_so_is_the_edge_of_what_stands_before_something() {
         let away =
             |step_cm| kept(|column| u16::from(column < 200) * (500 + step_cm * column as u16));
-        assert_eq!(away(15).len(), 200);
-        assert!(away(5).len() < 110);
+        assert_eq!(away(11).len(), 200);
+        assert!(away(9).len() < 200);
+        assert!(away(2).len() < 110);
         let before = kept(|column| match column {
-            202..=249 => 450,
+            202..=249 => 400,
             101..=299 => 500,
             _ => 0,
         });
@@ -210,8 +216,8 @@ mod tests {
             _ => 0,
         });
         let kept = kept_of(&scan, |_| true);
-        let kept = kept.chunk_by(|a, b| a / MAX_LAYERS as u32 == b / MAX_LAYERS as u32);
-        let columns: Vec<u32> = kept.map(|own| own[0] / MAX_LAYERS as u32).collect();
+        let kept = kept.chunk_by(|a, b| number_of(*a) == number_of(*b));
+        let columns: Vec<u32> = kept.map(|own| number_of(own[0])).collect();
         assert_eq!(columns, every(4, 100..=199));
     }
 
@@ -230,8 +236,52 @@ mod tests {
         assert_eq!(layers(|layer| layer < 8, |_| 0), [0, 7]);
         assert_eq!(layers(|layer| layer < 12, |_| 0), [0, 8, 9, 10, 11]);
         assert_eq!(layers(|layer| layer < 8 && layer != 4, |_| 0), [0, 3, 5, 7]);
+        // A metre farther away layer 0 is 0.09 m above the ground: grass.
+        assert_eq!(layers(|layer| layer < 8, |_| 100), [0, 1, 7]);
         let step = |layer| 30 * u16::from(layer > 2);
         assert_eq!(layers(|layer| layer < 8, step), [0, 2, 3, 7]);
+    }
+
+    #[test]
+    fn what_is_seen_through_low_panes_leaves_the_body_above_them_whole() {
+        let scan = scan_of(1800, |column, layer| match (column, layer) {
+            (100..200, 4..7) => 600 + 300 * u16::from(column % 3 == 0),
+            (100..200, 7..9) => 600,
+            _ => 0,
+        });
+        let kept = kept_of(&scan, |_| true);
+        let kept = kept.chunk_by(|a, b| number_of(*a) == number_of(*b));
+        let columns: Vec<u32> = kept.map(|own| number_of(own[0])).collect();
+        assert_eq!(columns, every(4, 100..=199));
+    }
+
+    #[test]
+    fn a_post_behind_something_low_is_kept_with_both_its_ends() {
+        let scan = scan_of(1800, |column, layer| match (column, layer) {
+            (100..200, 1..3) => 390,
+            (105..=110, 6..12) => 420,
+            _ => 0,
+        });
+        let kept = kept_of(&scan, |_| true);
+        let of_post = kept.iter().filter(|point| **point % MAX_LAYERS as u32 > 5);
+        let mut columns: Vec<u32> = of_post.map(|point| number_of(*point)).collect();
+        columns.dedup();
+        assert_eq!(columns, [105, 108, 110]);
+    }
+
+    #[test]
+    fn nothing_is_left_of_the_cluster_before() {
+        let scan = scan_of(1800, |column, layer| {
+            u16::from(column < 200 && layer == 7) * 500
+        });
+        let points = (0..200).map(|column| scan.index(column, 7) as u32);
+        let points: Vec<u32> = points.collect();
+        let mut thinning = Thinning::default();
+        thinning.begin(&scan);
+        with_scene(&scan, |scene| {
+            let once = thinning.thin(&points, scene).to_vec();
+            assert_eq!(thinning.thin(&points, scene), once);
+        });
     }
 
     #[test]

@@ -90,7 +90,8 @@ pub enum TileError {
 /// Cells of a row of which the differences are found together.
 const AT_ONCE: usize = 64;
 
-/// Writes the levels of a tile's cells, from -[`LEVELS`] to [`LEVELS`], rows of `side` cells.
+/// Writes the levels of a tile's cells, from -[`LEVELS`] to [`LEVELS`], rows of `side` cells, which is
+/// not 0.
 pub fn encode_cells(levels: &[i16], side: usize, out: &mut Vec<u8>) {
     out.clear();
     let mut put = |difference: u8, cells: usize| {
@@ -118,7 +119,8 @@ pub fn encode_cells(levels: &[i16], side: usize, out: &mut Vec<u8>) {
     put(difference, levels.len() - begin);
 }
 
-/// What a run says of each of some cells: how much higher it is than that to the south, modulo 16.
+/// What a run says of each of some cells: how much higher it is than that to the south, modulo 16. The
+/// cells to the south may be followed by others.
 fn differences(cells: &[i16], souths: Option<&[i16]>) -> [u8; AT_ONCE] {
     let padded = |levels: &[i16]| {
         let mut padded = [0; AT_ONCE];
@@ -232,12 +234,23 @@ mod tests {
     #[test]
     fn any_cells_come_back_as_they_were() {
         let mut random = Random::new(1);
-        for side in [1, 5, 64] {
+        for side in [1, 5, 64, 65, 130] {
             for spread in [0.0, 3.0, 14.99] {
                 let mut level = || (spread * random.uniform()) as i16 - LEVELS;
                 let levels: Vec<i16> = (0..side * side).map(|_| level()).collect();
                 assert_eq!(tile(&levels, side).levels(7), Ok(levels));
             }
+        }
+    }
+
+    #[test]
+    fn a_run_goes_on_over_the_ends_of_rows_whatever_their_length() {
+        for side in [5, 64, 65, 130] {
+            let levels: Vec<i16> = (0..5 * side).map(|cell| (cell / side) as i16 + 1).collect();
+            let (mut cells, mut one) = (vec![], vec![]);
+            encode_cells(&levels, side, &mut cells);
+            put_varint(&mut one, (5 * side as u64) << 4 | 1);
+            assert_eq!(cells, one, "{side}");
         }
     }
 
