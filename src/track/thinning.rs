@@ -35,9 +35,12 @@ const MANY: usize = 128;
 /// show a head (`people`).
 const APART_M: f64 = 0.12;
 /// A difference of ranges from which on two returns of a column, one above the other, or the nearest
-/// ones of two columns are kept: there something ends, or leads away from the sensor. With the width
-/// of the columns between them it is less than a cell of which parts consist.
+/// ones of two columns are kept: there something ends, or leads away from the sensor.
 const JUMP_M: f32 = 0.1;
+/// How much nearer or farther than the last column that was kept the next one is kept for that. With
+/// the columns between them and a step from the last of these it is less than a cell of which parts
+/// consist, so that a surface stays one.
+const SLOPE_M: f32 = 0.05;
 
 impl Thinning {
     /// Prepares for the returns of a scan.
@@ -67,7 +70,7 @@ impl Thinning {
         for (place, column) in self.columns.iter().enumerate() {
             let next = self.columns.get(place + 1);
             let is_end = next.is_none_or(|next| !column.is_continued_by(next));
-            let leads_away = (column.nearest_m - kept_m).abs() >= JUMP_M;
+            let leads_away = (column.nearest_m - kept_m).abs() >= SLOPE_M;
             let is_due = column
                 .number
                 .is_multiple_of(self.columns_at(column.nearest_m));
@@ -188,7 +191,7 @@ mod tests {
         let away =
             |step_cm| kept(|column| u16::from(column < 200) * (500 + step_cm * column as u16));
         assert_eq!(away(11).len(), 200);
-        assert!(away(9).len() < 200);
+        assert!(away(4).len() < 200);
         assert!(away(2).len() < 110);
         let before = kept(|column| match column {
             202..=249 => 400,
