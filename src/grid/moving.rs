@@ -93,10 +93,7 @@ pub(super) fn clear_way(object: &Object, now: Time, map: &mut Map, cell_m: f64, 
             let cell = |x: i32| (y - corner[1]) as usize * TILE_CELLS + (x - corner[0]) as usize;
             let row = &tile.log_odds[cell(*columns.start())..=cell(*columns.end())];
             // Hardly anything was ever seen where something moves.
-            if row
-                .iter()
-                .fold(true, |is_free, log_odds| is_free & (*log_odds <= 0))
-            {
+            if row.iter().all(|log_odds| *log_odds <= 0) {
                 continue;
             }
             for x in columns.clone() {

@@ -3,7 +3,7 @@
 
 use super::Scene;
 use super::parts::{CUT_M, LOW_M};
-use crate::cloud::{MAX_LAYERS, Scan};
+use crate::cloud::Scan;
 use crate::float::least;
 
 /// Thins the returns of clusters column by column, and within each column. Its buffers are made once.
@@ -19,14 +19,14 @@ pub(super) struct Thinning {
 /// What a column shows of a cluster.
 #[derive(Debug, Clone, Copy)]
 struct Column {
-    number: u32,
+    number: usize,
     /// Where its points stand among those of the cluster.
-    begin: u32,
-    end: u32,
+    begin: usize,
+    end: usize,
     /// Least of their ranges: rays pass through panes here and there, but not through all of a body.
     nearest_m: f32,
     /// The layer of the highest one: what stands behind something nearer is higher, or is not seen.
-    top: u32,
+    top: usize,
 }
 
 /// Clusters of fewer returns are kept whole: people, and what is far away.
@@ -53,7 +53,7 @@ impl Thinning {
     }
 
     /// Of how many columns one is kept at a range.
-    fn columns_at(&self, range_m: f32) -> u32 {
+    fn columns_at(&self, range_m: f32) -> usize {
         let halvings = self.below_m.iter().filter(|below_m| range_m < **below_m);
         1 << halvings.count()
     }
@@ -64,7 +64,7 @@ impl Thinning {
             return points;
         }
         let (range_m, heights_m) = (scene.scan.range_m(), scene.heights_m);
-        self.find_columns(points, range_m);
+        self.find_columns(points, scene.scan);
         self.kept.clear();
         let (mut is_begin, mut kept_m) = (true, f32::INFINITY);
         for (place, column) in self.columns.iter().enumerate() {
@@ -75,7 +75,7 @@ impl Thinning {
                 .number
                 .is_multiple_of(self.columns_at(column.nearest_m));
             if is_begin || is_end || leads_away || is_due {
-                let own = &points[column.begin as usize..column.end as usize];
+                let own = &points[column.begin..column.end];
                 keep_ends(own, range_m, heights_m, &mut self.kept);
                 kept_m = column.nearest_m;
             }
@@ -85,27 +85,24 @@ impl Thinning {
     }
 
     /// Finds what each column shows of a cluster.
-    fn find_columns(&mut self, points: &[u32], range_m: &[f32]) {
+    fn find_columns(&mut self, points: &[u32], scan: &Scan) {
+        let number = |point: u32| scan.column(point as usize);
+        let ranges_m = scan.range_m();
         self.columns.clear();
         let mut end = 0;
-        for own in points.chunk_by(|a, b| number_of(*a) == number_of(*b)) {
+        for own in points.chunk_by(|a, b| number(*a) == number(*b)) {
             let begin = end;
-            end += own.len() as u32;
-            let ranges_m = own.iter().map(|point| range_m[*point as usize]);
+            end += own.len();
+            let own_ranges_m = own.iter().map(|point| ranges_m[*point as usize]);
             self.columns.push(Column {
-                number: number_of(own[0]),
+                number: number(own[0]),
                 begin,
                 end,
-                nearest_m: ranges_m.fold(f32::INFINITY, least),
-                top: own[own.len() - 1] % MAX_LAYERS as u32,
+                nearest_m: own_ranges_m.fold(f32::INFINITY, least),
+                top: scan.layer(own[own.len() - 1] as usize),
             });
         }
     }
-}
-
-/// The number of a point's column.
-fn number_of(point: u32) -> u32 {
-    point / MAX_LAYERS as u32
 }
 
 impl Column {
@@ -122,18 +119,21 @@ fn keep_ends(points: &[u32], range_m: &[f32], heights_m: &[f32], kept: &mut Vec<
     let Some((first, others)) = points.split_first() else {
         return;
     };
-    let seen = |point: u32| (range_m[point as usize], heights_m[point as usize]);
-    let (mut below, mut below_m, mut is_continued_below) = (*first, seen(*first), false);
+    let is_continued_by = |below: usize, above: usize| {
+        let apart_m = (range_m[above] - range_m[below]).abs();
+        let are_grass = [below, above].map(|point| heights_m[point] < LOW_M);
+        below + 1 == above
+            && apart_m < JUMP_M
+            && heights_m[above] <= CUT_M
+            && are_grass[0] == are_grass[1]
+    };
+    let (mut below, mut is_continued_below) = (*first, false);
     for point in others {
-        let own_m = seen(*point);
-        let is_continued = below + 1 == *point
-            && (own_m.0 - below_m.0).abs() < JUMP_M
-            && own_m.1 <= CUT_M
-            && (own_m.1 < LOW_M) == (below_m.1 < LOW_M);
+        let is_continued = is_continued_by(below as usize, *point as usize);
         if !(is_continued_below && is_continued) {
             kept.push(below);
         }
-        (below, below_m, is_continued_below) = (*point, own_m, is_continued);
+        (below, is_continued_below) = (*point, is_continued);
     }
     kept.push(below);
 }
@@ -141,6 +141,7 @@ fn keep_ends(points: &[u32], range_m: &[f32], heights_m: &[f32], kept: &mut Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cloud::MAX_LAYERS;
     use crate::cloud::tests::scan_of;
     use crate::track::tests::with_scene;
 
@@ -158,8 +159,15 @@ mod tests {
         let scan = scan_of(1800, |column, layer| {
             u16::from(layer == 7) * range_cm(column)
         });
-        let kept = kept_of(&scan, |_| true);
-        kept.iter().map(|point| number_of(*point)).collect()
+        columns_of(&kept_of(&scan, |_| true))
+    }
+
+    /// The columns of some points.
+    fn columns_of(points: &[u32]) -> Vec<u32> {
+        let columns = points.iter().map(|point| point / MAX_LAYERS as u32);
+        let mut columns: Vec<u32> = columns.collect();
+        columns.dedup();
+        columns
     }
 
     /// Some columns with their ends.
@@ -218,10 +226,7 @@ mod tests {
             (100..200, 7..9) => 600 + 200 * u16::from(column % 3 == 0),
             _ => 0,
         });
-        let kept = kept_of(&scan, |_| true);
-        let kept = kept.chunk_by(|a, b| number_of(*a) == number_of(*b));
-        let columns: Vec<u32> = kept.map(|own| number_of(own[0])).collect();
-        assert_eq!(columns, every(4, 100..=199));
+        assert_eq!(columns_of(&kept_of(&scan, |_| true)), every(4, 100..=199));
     }
 
     #[test]
@@ -252,10 +257,7 @@ mod tests {
             (100..200, 7..9) => 600,
             _ => 0,
         });
-        let kept = kept_of(&scan, |_| true);
-        let kept = kept.chunk_by(|a, b| number_of(*a) == number_of(*b));
-        let columns: Vec<u32> = kept.map(|own| number_of(own[0])).collect();
-        assert_eq!(columns, every(4, 100..=199));
+        assert_eq!(columns_of(&kept_of(&scan, |_| true)), every(4, 100..=199));
     }
 
     #[test]
@@ -265,11 +267,9 @@ mod tests {
             (105..=110, 6..12) => 420,
             _ => 0,
         });
-        let kept = kept_of(&scan, |_| true);
-        let of_post = kept.iter().filter(|point| **point % MAX_LAYERS as u32 > 5);
-        let mut columns: Vec<u32> = of_post.map(|point| number_of(*point)).collect();
-        columns.dedup();
-        assert_eq!(columns, [105, 108, 110]);
+        let mut of_post = kept_of(&scan, |_| true);
+        of_post.retain(|point| scan.layer(*point as usize) > 5);
+        assert_eq!(columns_of(&of_post), [105, 108, 110]);
     }
 
     #[test]
