@@ -47,7 +47,7 @@ super::message! {
         20 => age: f32,
         /// Seconds since it was last measured.
         21 => time_since_measurement: f32,
-        /// Returns on it in this revolution.
+        /// Returns on it in this revolution; of what is near and shows many, about as many.
         22 => number_of_points: u32,
     }
 }
