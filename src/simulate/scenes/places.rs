@@ -52,6 +52,14 @@ pub(super) fn car_park(random: &mut Random) -> Scene {
     scenery.wall([0.0, 50.0], 0.0, 40.0, 2.5);
     scenery.hedge([18.5, 15.0], 90.0, 36.0, 1.2);
     scenery.house([4.0, -28.0], 0.0, [30.0, 10.0], 5.0);
+    // The lane that leads away from it.
+    for step in 0..6 {
+        let x = 38.0 + 18.0 * f64::from(step);
+        scenery
+            .wall([x, 42.0], 0.0, 12.0, 1.8)
+            .pole([x + 9.0, 28.0], 0.08, 5.0);
+        scenery.hedge([x, 27.0], 0.0, 11.0, 1.2);
+    }
     Scene {
         sensor_height_m: SENSOR_M,
         ego: Path::from([0.0; 2], 90.0)

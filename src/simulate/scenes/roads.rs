@@ -28,6 +28,17 @@ pub(super) fn street(random: &mut Random) -> Scene {
             }
         }
     }
+    // The street that it turns into.
+    for step in 0..18 {
+        let x = 24.0 + 19.0 * f64::from(step);
+        for (side, front_m) in [(1.0, 15.0), (-1.0, 16.0)] {
+            let y = 99.5 + side * 7.2;
+            scenery
+                .tree([x + 4.0, y], 1.5)
+                .pole([x - 3.0, y], 0.08, 6.0);
+            scenery.house([x + 6.0, 99.5 + side * front_m], 90.0, [9.0, 12.0], 7.0);
+        }
+    }
     // Parked along both kerbs, with gaps.
     for step in 0..14 {
         let y = 4.0 + 7.5 * f64::from(step) + random.uniform();
@@ -106,7 +117,7 @@ pub(super) fn hill(random: &mut Random) -> Scene {
         unevenness_m: 0.02,
     };
     let mut scenery = Scenery::on(&terrain);
-    for step in 0..12 {
+    for step in 0..25 {
         let y = -30.0 + 20.0 * f64::from(step);
         scenery.tree([9.0, y], 1.8).tree([-13.0, y + 9.0], 2.0);
         scenery.bush([7.5, y + 6.0], 0.9, 1.3);

@@ -112,6 +112,15 @@ fn round_scenery() -> Scenery {
     scenery.hedge([x - 26.0, y - 26.0], 45.0, 12.0, 1.3);
     scenery.house([x - 30.0, y - 38.0], 10.0, [16.0, 10.0], 6.0);
     scenery.wall([x + 12.0, y - 50.0], 90.0, 36.0, 1.6);
+    // Along the way out.
+    for step in 0..14 {
+        let far_m = y + 40.0 + 25.0 * f64::from(step);
+        scenery
+            .tree([x + 9.0, far_m], 1.6)
+            .pole([x - 7.0, far_m + 8.0], 0.08, 6.0);
+        scenery.house([x - 18.0, far_m + 4.0], 0.0, [10.0, 12.0], 6.0);
+        scenery.hedge([x + 12.0, far_m + 12.0], 90.0, 14.0, 1.4);
+    }
     scenery
 }
 
@@ -154,6 +163,16 @@ pub(super) fn mini_roundabout(random: &mut Random) -> Scene {
         scenery.hedge(at(13.0, 25.0), 90.0, 22.0, 1.1);
         scenery.tree(at(16.0, 17.0), 2.0).tree(at(27.0, 21.0), 2.5);
         scenery.bush(at(19.0, 15.5), 0.8, 1.2);
+    }
+    // Along the way out, to the west.
+    for step in 0..8 {
+        let far_m = x - 45.0 - 22.0 * f64::from(step);
+        scenery
+            .tree([far_m, y + 8.0], 2.0)
+            .tree([far_m - 9.0, y - 9.0], 2.2);
+        scenery
+            .hedge([far_m - 4.0, y + 13.0], 0.0, 15.0, 1.3)
+            .pole([far_m, y - 6.0], 0.06, 1.1);
     }
     let ride = Path::circle(centre_m, 10.2, 150.0, 3.6);
     let actors = vec![
