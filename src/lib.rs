@@ -5,9 +5,9 @@
 //! A revolution walks through the house once, front to back:
 //!
 //! ```text
-//! datagram -> wire -> cloud -> ground -> cluster -> track -> wire -> datagram
-//!                |        \_____________________\-> grid -/
-//!                \-> ego ----------------------/----/
+//! datagram -> wire -> cloud -> odometry -> ego -> ground -> cluster -> track -> wire -> datagram
+//!                |                        /  \ \______________________\-> grid -/
+//!                \-> poses --------------/    \-------------------------/
 //! ```
 //!
 //! Everything but the shell is pure: no I/O, no clock, no thread, no global state. The same
@@ -19,6 +19,12 @@ pub mod wire;
 
 // A message to the static array of points.
 pub mod cloud;
+
+// Boxes from above, places and directions in space.
+pub mod geometry;
+
+// How the sensor moves, from what it sees.
+pub mod odometry;
 
 // Where the vehicle was meanwhile.
 pub mod ego;

@@ -1,13 +1,13 @@
 //! All the steps, in order. This is the one place that names them all.
 
-use crate::cloud::{Dialect, Intake, Revolution, Scan};
+use crate::cloud::{Dialect, Extent, Intake, OwnVehicle, Revolution, Scan};
 use crate::cluster::Dbscan;
 use crate::config::Configuration;
-use crate::ego::{Ego, Heard, Placement, Pose, Sweep};
+use crate::ego::{Ego, EgoReport, Frame, Heard, Placement, Pose, Sweep};
 use crate::grid::{Grid, Perceived};
 use crate::ground::{Ground, GroundReport, Origin};
 use crate::publish::{Heading, Publisher};
-use crate::time::{Span, Time};
+use crate::time::Time;
 use crate::track::{Object, Scene, Tracker};
 use crate::wire::point_cloud::{CompactPointCloud, POINT_CLOUD_ID};
 use crate::wire::status::Status;
@@ -40,6 +40,7 @@ pub struct Pipeline {
     configuration: Configuration,
     intake: Intake,
     scan: Scan,
+    own_vehicle: OwnVehicle,
     ego: Ego,
     sweep: Sweep,
     /// How the points of each column of the last revolution are placed.
@@ -47,6 +48,8 @@ pub struct Pipeline {
     ground: Ground,
     clusters: Dbscan,
     tracker: Tracker,
+    /// The last revolution's objects in the local frame.
+    objects: Vec<Object>,
     grid: Grid,
     publisher: Publisher,
     last: Option<RevolutionReport>,
@@ -54,6 +57,10 @@ pub struct Pipeline {
 }
 
 /// What an envelope was.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "it lives on the stack for a moment; a box would allocate for every revolution"
+)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Outcome {
     /// A revolution that is to be answered.
@@ -71,6 +78,8 @@ pub enum Outcome {
 pub enum Step {
     /// Bytes to points.
     Cloud,
+    /// Points to the sensor's motion.
+    Ego,
     /// Points to ground and what stands on it.
     Ground,
     /// Points to clusters.
@@ -100,8 +109,12 @@ pub struct RevolutionReport {
     pub returns: usize,
     /// The ground.
     pub ground: GroundReport,
-    /// Where the vehicle is, if that is known.
+    /// Where the vehicle is in the local frame, if that is known.
     pub vehicle: Option<Pose>,
+    /// The frame that this is in.
+    pub frame: Frame,
+    /// How the sensor's motion was found.
+    pub ego: EgoReport,
     /// Clusters that were found.
     pub clusters: usize,
     /// Objects to be published.
@@ -114,12 +127,14 @@ impl Pipeline {
         Self {
             intake: Intake::default(),
             scan: Scan::default(),
+            own_vehicle: OwnVehicle::default(),
             ego: Ego::new(&configuration.ego),
             sweep: Sweep::still(0),
             placements: vec![],
             ground: Ground::new(&configuration.ground),
             clusters: Dbscan::new(&configuration.cluster),
             tracker: Tracker::new(&configuration.track),
+            objects: vec![],
             grid: Grid::new(&configuration.grid),
             publisher: Publisher::new(&configuration.publish, sender_stamp),
             last: None,
@@ -204,18 +219,29 @@ impl Pipeline {
         mut done: impl FnMut(Step),
     ) -> RevolutionReport {
         if revolution.time_jumped {
+            self.ego.reset();
             self.ground.reset();
             self.tracker.reset();
             self.grid.reset();
         }
-        self.scan.fill(revolution, &self.configuration.cloud);
+        self.scan
+            .fill(revolution, &self.own_vehicle, &self.configuration.cloud);
         done(Step::Cloud);
-        let swept = Span::from_seconds(-self.scan.duration_s());
-        let sweep = self.ego.sweep(revolution.time + swept, revolution.time);
+        let expected = self.ego.expect(&self.scan);
+        let moving = self.tracker.expect_moving(revolution.time, &expected);
+        let sweep = self.ego.follow(&self.scan, moving);
+        done(Step::Ego);
         self.sweep = sweep;
         sweep.placements(self.scan.columns(), &mut self.placements);
-        let expected = self.tracker.expect(revolution.time, &self.sweep);
-        let ground = self.ground.process(&self.scan, expected);
+        let driving = self.tracker.expect_driving(revolution.time, &sweep);
+        let ground = self.ground.process(&self.scan, driving);
+        let way_m = sweep.way_m();
+        self.own_vehicle.learn(
+            &self.scan,
+            self.ground.heights_m(),
+            way_m,
+            &self.configuration.cloud,
+        );
         done(Step::Ground);
         let (mask, heights_m) = (self.ground.mask(), self.ground.heights_m());
         let clusters = self.clusters.process(&self.scan, mask, heights_m);
@@ -228,6 +254,9 @@ impl Pipeline {
             placements: &self.placements,
         };
         let objects = self.tracker.process(clusters, &scene);
+        self.objects.clear();
+        let in_local_frame = |object: &Object| object.in_local_frame(&sweep.anchor);
+        self.objects.extend(objects.iter().map(in_local_frame));
         done(Step::Track);
 
         let report = RevolutionReport {
@@ -241,8 +270,10 @@ impl Pipeline {
             returns: self.scan.returns(),
             ground,
             vehicle: sweep.vehicle,
+            frame: sweep.frame,
+            ego: self.ego.report(),
             clusters: clusters.len(),
-            objects: objects.len(),
+            objects: self.objects.len(),
         };
         self.counts.time_jumps += u64::from(report.time_jumped);
         self.counts.ground_held += u64::from(ground.origin == Origin::Held);
@@ -266,8 +297,7 @@ impl Pipeline {
                 processing_s,
                 sweep: &self.sweep,
             };
-            self.publisher
-                .publish_objects(&heading, self.tracker.objects());
+            self.publisher.publish_objects(&heading, &self.objects);
         }
         self.publisher.frames()
     }
@@ -311,9 +341,19 @@ impl Pipeline {
         self.clusters.clusters()
     }
 
-    /// The last revolution's objects, by id.
+    /// The last revolution's objects in the local frame, by id.
     pub fn objects(&self) -> &[Object] {
-        self.tracker.objects()
+        &self.objects
+    }
+
+    /// Where the sensor was in the last revolution.
+    pub fn sweep(&self) -> &Sweep {
+        &self.sweep
+    }
+
+    /// How far the own vehicle is seen, if it is.
+    pub fn own_vehicle(&self) -> Option<Extent> {
+        self.own_vehicle.extent()
     }
 
     /// The map of the static world.
@@ -352,6 +392,16 @@ impl Pipeline {
             status.intensity_bits = last.dialect.intensity_bits.into();
             status.ground_height = last.ground.plane.height_m() as f32;
             status.ground_tilt = last.ground.plane.tilt_rad() as f32;
+            status.odometry = last.ego.odometry.quality.name().into();
+            status.odometry_deviation = last.ego.odometry.deviation_m as f32;
+            status.odometry_restarts = last.ego.restarts;
+            status.pose_source = last.ego.source.into();
+            status.pose_disagreement = last.ego.disagreement_m as f32;
+            status.pose_jumps = last.ego.jumps;
+        }
+        if let Some(extent) = self.own_vehicle.extent() {
+            [status.own_vehicle_left, status.own_vehicle_back, _] = extent.low_m;
+            [status.own_vehicle_right, status.own_vehicle_front, _] = extent.high_m;
         }
         status
     }

@@ -97,7 +97,7 @@ impl Publisher {
         keep_nearest(
             objects,
             self.parameters.most_objects,
-            &heading.sweep.sensor,
+            &heading.sweep.local_sensor(),
             &mut kept,
         );
         let postmark = Postmark {
@@ -118,7 +118,11 @@ impl Publisher {
             let validity = Span::from_seconds(self.parameters.environment_validity_s);
             self.put(
                 &postmark,
-                &environment_of(heading.time + validity, &kept, &heading.sweep.sensor),
+                &environment_of(
+                    heading.time + validity,
+                    &kept,
+                    &heading.sweep.local_sensor(),
+                ),
             );
         }
         self.kept = kept;
@@ -149,7 +153,7 @@ impl Publisher {
             AngleUnit::Radians => 1.0,
         };
         for object in objects {
-            let (object_id, sight) = (object.id, Sight::of(object, &heading.sweep.sensor));
+            let (object_id, sight) = (object.id, Sight::of(object, &heading.sweep.local_sensor()));
             let [x, y, z] = sight.position_m.map(|metres| metres as f32);
             self.put(postmark, &opendlv::ObjectAnnouncement { object_id });
             self.put(

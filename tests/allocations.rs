@@ -72,7 +72,7 @@ fn at_time(frame: &[u8], number: usize) -> Vec<u8> {
 #[test]
 fn a_warm_revolution_allocates_nothing() {
     const REVOLUTIONS: usize = 30;
-    const ROUNDS: usize = 8;
+    const ROUNDS: usize = 16;
     let frames = drive("roundabout", REVOLUTIONS);
     let mut pipeline = Pipeline::new(&Configuration::default(), 0);
     let mut allocations = [0; ROUNDS];

@@ -5,7 +5,7 @@
 
 mod common;
 
-use kreisel::cloud::{Intake, Scan};
+use kreisel::cloud::{Intake, OwnVehicle, Scan};
 use kreisel::cluster::{ClusterParameters, Clusters, Dbscan, WindowSetting};
 use kreisel::config::Configuration;
 use kreisel::parameter::Profile;
@@ -42,7 +42,7 @@ fn scan_of(distances_cm: &[u16], start_deg: f32, end_deg: f32) -> Scan {
         .accept(&Envelope::default(), cloud, &configuration.cloud)
         .unwrap();
     let mut scan = Scan::default();
-    scan.fill(&revolution, &configuration.cloud);
+    scan.fill(&revolution, &OwnVehicle::default(), &configuration.cloud);
     scan
 }
 

@@ -4,13 +4,12 @@
 mod common;
 
 use std::collections::BTreeMap;
-use std::f64::consts::FRAC_PI_2;
 
 use kreisel::config::Configuration;
 use kreisel::parameter::Profile;
 use kreisel::pipeline::{Outcome, Pipeline};
 use kreisel::simulate::scenario;
-use kreisel::simulate::{Simulation, TrueObject, Truth};
+use kreisel::simulate::{Simulation, TrueObject};
 use kreisel::track::Object;
 use kreisel::wire::Recording;
 
@@ -55,19 +54,6 @@ fn in_frame(object: &Object) -> [f64; 2] {
     [object.centre_m[0], object.centre_m[1]]
 }
 
-/// Where an object in the sensor frame stands in the world.
-fn from_sensor(truth: &Truth) -> impl Fn(&Object) -> [f64; 2] {
-    let (sine, cosine) = (truth.sensor_yaw_rad - FRAC_PI_2).sin_cos();
-    let [x, y, _] = truth.sensor_m;
-    move |object| {
-        let [right, ahead, _] = object.centre_m;
-        [
-            x + right * cosine - ahead * sine,
-            y + right * sine + ahead * cosine,
-        ]
-    }
-}
-
 #[test]
 fn nothing_moves_where_everything_is_parked() {
     let Some(path) = common::data("vlp16-parked-car-85rev.rec") else {
@@ -105,16 +91,11 @@ fn ids_survive_the_loss_and_the_return_of_poses() {
             let mut frames = vec![];
             let truth = simulation.revolve(&mut frames);
             feed(&mut pipeline, &frames, !LOST.contains(&revolution));
-            // What is carried on ends after half a second.
-            let has_pose = !(LOST.start + 5..LOST.end).contains(&revolution);
             let is_switch = [LOST.start + 10, LOST.end + 5].contains(&revolution);
             for user in truth.objects.iter().filter(|user| user.points >= 20) {
-                let found = if has_pose {
-                    id_of(user, pipeline.objects(), in_frame)
-                } else {
-                    id_of(user, pipeline.objects(), from_sensor(&truth))
+                let Some(id) = id_of(user, pipeline.objects(), in_frame) else {
+                    continue;
                 };
-                let Some(id) = found else { continue };
                 match ids.insert(user.id, id) {
                     Some(before) if is_switch && before == id => kept += 1,
                     Some(before) if is_switch && before != id => changed += 1,

@@ -95,10 +95,11 @@ mod mark {
             )*
         };
     }
-    marks! { step_begins step_cloud step_ground step_cluster step_track step_objects step_grid step_tiles }
+    marks! { step_begins step_cloud step_ego step_ground step_cluster step_track step_objects step_grid step_tiles }
 
     pub(super) const DONE: [fn(); super::PARTS] = [
         step_cloud,
+        step_ego,
         step_ground,
         step_cluster,
         step_track,
@@ -109,13 +110,14 @@ mod mark {
 }
 
 /// What is timed one by one.
-const PARTS: usize = 7;
+const PARTS: usize = 8;
 /// Those that are done when the objects are sent.
-const BEFORE_MAP: usize = 5;
+const BEFORE_MAP: usize = 6;
 /// Names of what is timed: the pipeline's steps to the frames of the objects, then the map and
 /// the frames of its tiles, all but the map, and all of it.
 pub(crate) const NAMES: [&str; PARTS + 2] = [
     "cloud",
+    "ego",
     "ground",
     "cluster",
     "track",

@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::{Completion, files};
 use crate::cloud::{Intake, sensor, shown_order};
 use crate::config::Configuration;
+use crate::pipeline::Pipeline;
 use crate::time::Time;
 use crate::wire::point_cloud::{ByteOrder, CompactPointCloud, POINT_CLOUD_ID, Schema};
 use crate::wire::recording::Entry;
@@ -32,6 +33,7 @@ struct Report {
     duration_s: f64,
     messages: Vec<MessageReport>,
     point_clouds: Vec<CloudReport>,
+    own_vehicle: Option<OwnVehicleReport>,
     damage: Vec<DamageReport>,
 }
 
@@ -66,6 +68,15 @@ struct CloudReport {
     intensity_bits: u8,
     /// Why the daemon would not process it.
     refused: Option<String>,
+}
+
+/// How far the own vehicle is seen in the sensor frame.
+#[derive(Debug, Serialize)]
+struct OwnVehicleReport {
+    left_m: f32,
+    right_m: f32,
+    back_m: f32,
+    front_m: f32,
 }
 
 #[derive(Debug, Serialize)]
@@ -107,10 +118,15 @@ fn inspect(bytes: &[u8]) -> Report {
     };
     let mut messages: BTreeMap<(i32, u32), MessageReport> = BTreeMap::new();
     let mut intake = Intake::default();
+    let mut configuration = Configuration::default();
+    configuration.grid.enabled = false;
+    let mut pipeline = Pipeline::new(&configuration, 0);
     for item in Recording::new(bytes) {
         match item {
             Ok(entry) => {
                 report.envelopes += 1;
+                // What is refused is told below, message by message.
+                let _ = pipeline.handle(&entry.envelope);
                 let key = (entry.envelope.data_type, entry.envelope.sender_stamp);
                 messages.entry(key).or_default().add(&entry);
                 if entry.envelope.data_type == POINT_CLOUD_ID {
@@ -124,6 +140,12 @@ fn inspect(bytes: &[u8]) -> Report {
             }),
         }
     }
+    report.own_vehicle = pipeline.own_vehicle().map(|extent| OwnVehicleReport {
+        left_m: extent.low_m[0],
+        right_m: extent.high_m[0],
+        back_m: extent.low_m[1],
+        front_m: extent.high_m[1],
+    });
     let times = || messages.values();
     let first = times().map(|message| message.first).min();
     let last = times().map(|message| message.last).max();
@@ -257,6 +279,15 @@ fn print(report: &Report) -> Result<()> {
         say!(
             "{} point clouds, {refused} refused",
             report.point_clouds.len()
+        );
+    }
+    if let Some(own) = &report.own_vehicle {
+        say!(
+            "the own vehicle is seen from {:.1} to {:.1} m to the right and from {:.1} to {:.1} m ahead: left out",
+            own.left_m,
+            own.right_m,
+            own.back_m,
+            own.front_m
         );
     }
     Ok(())

@@ -33,6 +33,12 @@ pub(super) struct Arguments {
     /// The map at the end.
     #[arg(long, value_name = "OUT.npz")]
     grid: Option<PathBuf>,
+    /// The sensor's way, one pose a revolution, in TUM format: t x y z qx qy qz qw.
+    #[arg(long, value_name = "OUT.tum")]
+    trajectory: Option<PathBuf>,
+    /// Ignore pose messages, as if the session had none.
+    #[arg(long)]
+    no_poses: bool,
     /// Truth to compare the objects with, as `kreisel simulate` writes it.
     #[arg(long, value_name = "FILE.jsonl")]
     truth: Option<PathBuf>,
@@ -52,6 +58,7 @@ struct Process<'a> {
     pipeline: Pipeline,
     output: Option<Output>,
     objects: Option<Output>,
+    trajectory: Option<Output>,
     labels: Option<LabelWriter>,
     score: Option<Score>,
     frame: Vec<u8>,
@@ -60,13 +67,15 @@ struct Process<'a> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
-    let configuration = files::configuration(arguments.config.as_deref())?;
+    let mut configuration = files::configuration(arguments.config.as_deref())?;
+    configuration.ego.use_poses &= !arguments.no_poses;
     let bytes = files::read(&arguments.input)?;
     let outputs = [
         &arguments.output,
         &arguments.objects,
         &arguments.labels,
         &arguments.grid,
+        &arguments.trajectory,
     ];
     files::check_distinct(&arguments.input, &outputs.map(Option::as_ref))?;
     if let Some(truth) = &arguments.truth {
@@ -78,6 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
         pipeline: Pipeline::new(&configuration, arguments.id),
         output: Output::create_if(arguments.output.as_deref())?,
         objects: Output::create_if(arguments.objects.as_deref())?,
+        trajectory: Output::create_if(arguments.trajectory.as_deref())?,
         labels: arguments
             .labels
             .as_deref()
@@ -146,6 +156,9 @@ impl Process<'_> {
         if let Some(output) = &mut self.objects {
             output.put(&objects::line(report, self.pipeline.objects())?)?;
         }
+        if let Some(output) = &mut self.trajectory {
+            output.put(trajectory_line(report.time, &self.pipeline).as_bytes())?;
+        }
         if let Some(score) = &mut self.score {
             score.take(report, self.pipeline.objects());
         }
@@ -178,7 +191,10 @@ impl Process<'_> {
     }
 
     fn finish(self, damages: usize) -> Result<Completion> {
-        for output in [self.output, self.objects].into_iter().flatten() {
+        for output in [self.output, self.objects, self.trajectory]
+            .into_iter()
+            .flatten()
+        {
             output.finish()?;
         }
         if let Some(labels) = self.labels {
@@ -230,4 +246,17 @@ impl Process<'_> {
             Ok(Completion::Done)
         }
     }
+}
+
+/// A line of a trajectory: where the sensor was at a time, in the local frame.
+fn trajectory_line(time: Time, pipeline: &Pipeline) -> String {
+    let sensor = pipeline.sweep().local_attitude();
+    let [x, y, z]: [f64; 3] = sensor.translation_m.into();
+    let [qx, qy, qz, qw] = sensor.quaternion();
+    let micros = time.micros();
+    format!(
+        "{}.{:06} {x:.6} {y:.6} {z:.6} {qx:.9} {qy:.9} {qz:.9} {qw:.9}\n",
+        micros.div_euclid(1_000_000),
+        micros.rem_euclid(1_000_000),
+    )
 }

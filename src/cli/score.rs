@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, anyhow};
 use serde::Deserialize;
 
 use super::files;
-use crate::ego::Pose;
+use crate::ego::{Frame, Pose};
 use crate::pipeline::RevolutionReport;
 use crate::track::Object;
 
@@ -158,12 +158,15 @@ fn is_counted(user: &TrueUser) -> bool {
 /// Where an object stands in the frame of the truth.
 fn place_m(object: &Object, report: &RevolutionReport, ego: &TrueEgo) -> [f64; 2] {
     let place_m = [object.centre_m[0], object.centre_m[1]];
-    if report.vehicle.is_some() {
+    if report.frame != Frame::Odometry {
         return place_m;
     }
-    let sensor = Pose {
+    // The frames began elsewhere: seen from the vehicle they are one.
+    let truly = Pose {
         position_m: [ego.x, ego.y, 0.0],
         yaw_rad: ego.yaw,
     };
-    sensor.placement().local_m(place_m)
+    let vehicle = report.vehicle.unwrap_or(Pose::SENSOR);
+    let from_vehicle_m = vehicle.placement().sensor_m(place_m);
+    truly.placement().local_m(from_vehicle_m)
 }

@@ -2,12 +2,14 @@
 //!
 //! `dialect` finds what the message does not say (byte order) and what it says in two ways
 //! (intensity, unit). `intake` decides whether the message is one whole revolution that the
-//! array can hold, `refusal` says why not. `scan` is the array, `passes` fills it.
+//! array can hold, `refusal` says why not. `scan` is the array, `passes` fills it, `own_vehicle` masks part of it.
 //! `sensor` has the elevation tables.
 
 mod dialect;
 
 mod intake;
+
+mod own_vehicle;
 
 mod passes;
 
@@ -22,8 +24,9 @@ pub mod sensor;
 
 pub use dialect::{ByteOrderSource, Dialect, shown_order};
 pub use intake::{Intake, Revolution};
+pub use own_vehicle::{Extent, OwnVehicle};
 pub use refusal::Refusal;
-pub use scan::{CAPACITY, MASKED, MAX_COLUMNS, MAX_LAYERS, Scan};
+pub use scan::{CAPACITY, MAX_COLUMNS, MAX_LAYERS, Scan};
 
 use crate::parameter::{choices, parameters};
 
@@ -68,7 +71,10 @@ parameters! {
         minimum_range_m: f64 = 1.0, in 0.0..=10.0, "m";
         /// Returns farther than this are dropped.
         maximum_range_m: f64 = 130.0, in 1.0..=655.35, "m";
-        /// Box around the own vehicle in the sensor frame (x right, y forward, z up), within
+        /// Whether what is seen of the own vehicle is learned and dropped: what is of one piece with what is
+        /// within 1.3 m of the sensor, and keeps its place there for a second.
+        own_vehicle: bool = true, thesis false, "";
+        /// Box around the own vehicle, instead of what is learned of it, in the sensor frame (x right, y forward, z up), within
         /// which returns are dropped: lowest x. The box is empty where low is not below high.
         vehicle_x_low_m: f64 = 0.0, in -10.0..=10.0, "m";
         /// Highest x of the own vehicle's box.

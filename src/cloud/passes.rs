@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 
 use super::Dialect;
-use super::scan::{MASKED, MAX_LAYERS};
+use super::scan::{MAX_LAYERS, NO_LAYER};
 use crate::float::greatest;
 
 /// Reads the ranges of columns of so many layers. What is not within the two that are kept is
@@ -29,10 +29,10 @@ pub(super) fn read_ranges(
             let units = dialect.byte_order.join(bytes[layer]) & dialect.distance_mask;
             let range_m = f32::from(units) * dialect.unit_m;
             let is_kept = (range_m >= low_m) & (range_m <= high_m);
-            let kept_m = if is_kept { range_m } else { MASKED };
+            let kept_m = if is_kept { range_m } else { -range_m };
             ranges_m[layer] = if units == 0 { 0.0 } else { kept_m };
         }
-        ranges_m[layers..].fill(MASKED);
+        ranges_m[layers..].fill(NO_LAYER);
     }
 }
 

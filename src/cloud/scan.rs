@@ -2,7 +2,7 @@
 
 use super::passes::{self, Coordinates};
 use super::sensor::{self, Sensor};
-use super::{CloudParameters, Revolution};
+use super::{CloudParameters, OwnVehicle, Revolution};
 use crate::ego::wrapped_rad;
 use crate::float::LANES;
 use crate::time::Time;
@@ -19,9 +19,8 @@ const _: () = assert!(MAX_LAYERS == 2 * LANES);
 /// Points that the array holds.
 pub const CAPACITY: usize = MAX_COLUMNS * MAX_LAYERS;
 
-/// The range of a point that has a return which is not used: too near, too far, or on the
-/// own vehicle. A point without a return has the range 0.
-pub const MASKED: f32 = -1.0;
+/// The range of points in layers that the sensor does not have: masked, and far from everything.
+pub(super) const NO_LAYER: f32 = f32::MIN;
 
 /// Tangent and cosine of the elevation of layers that a sensor does not have: they meet nothing.
 const UPRIGHT: (f64, f64) = (1e6, 1e-6);
@@ -66,7 +65,12 @@ impl Default for Scan {
 
 impl Scan {
     /// Takes a revolution in. [`super::Intake`] has seen to it that it fits.
-    pub fn fill(&mut self, revolution: &Revolution<'_>, parameters: &CloudParameters) {
+    pub fn fill(
+        &mut self,
+        revolution: &Revolution<'_>,
+        own: &OwnVehicle,
+        parameters: &CloudParameters,
+    ) {
         self.columns = revolution.cloud.columns();
         self.sensor = revolution.sensor;
         self.time = revolution.time;
@@ -74,7 +78,7 @@ impl Scan {
         self.step_rad = revolution.step_deg.to_radians();
         self.read_ranges(revolution, parameters);
         self.place_points();
-        self.mask_vehicle(parameters);
+        self.mask_vehicle(own, parameters);
     }
 
     /// Distances to metres; what is out of range is masked.
@@ -117,11 +121,13 @@ impl Scan {
         passes::place(ranges_m, &elevations, &self.directions, coordinates);
     }
 
-    fn mask_vehicle(&mut self, parameters: &CloudParameters) {
+    /// Masks what lies in the box around the own vehicle, or where it was learned to be if no box is given.
+    fn mask_vehicle(&mut self, own: &OwnVehicle, parameters: &CloudParameters) {
         let x = parameters.vehicle_x_low_m as f32..parameters.vehicle_x_high_m as f32;
         let y = parameters.vehicle_y_low_m as f32..parameters.vehicle_y_high_m as f32;
         let z = parameters.vehicle_z_low_m as f32..parameters.vehicle_z_high_m as f32;
         if x.is_empty() || y.is_empty() || z.is_empty() {
+            self.mask_own(own);
             return;
         }
         for point in 0..self.len() {
@@ -129,9 +135,14 @@ impl Scan {
                 && y.contains(&self.y_m[point])
                 && z.contains(&self.z_m[point]);
             if inside && self.range_m[point] > 0.0 {
-                self.range_m[point] = MASKED;
+                self.mask(point);
             }
         }
+    }
+
+    /// Uses a return no more.
+    pub(super) fn mask(&mut self, point: usize) {
+        self.range_m[point] = -self.range_m[point].abs();
     }
 
     /// Columns of this revolution.
@@ -274,7 +285,8 @@ impl Scan {
         point % MAX_LAYERS
     }
 
-    /// Ranges in metres: 0 without a return, [`MASKED`] where the return is not used.
+    /// Ranges in metres: 0 without a return, and negative where the return is not used: too near, too far, or on the own
+    /// vehicle.
     pub fn range_m(&self) -> &[f32] {
         &self.range_m[..self.len()]
     }
@@ -342,6 +354,7 @@ pub(crate) mod tests {
                 step_deg,
                 ..revolution(&distances)
             },
+            &OwnVehicle::default(),
             &CloudParameters::profile(Profile::Default),
         );
         scan
@@ -415,11 +428,12 @@ pub(crate) mod tests {
         (parameters.vehicle_x_low_m, parameters.vehicle_x_high_m) = (-4.0, -2.0);
         (parameters.vehicle_y_low_m, parameters.vehicle_y_high_m) = (-1.0, 1.0);
         let mut scan = Scan::default();
-        scan.fill(&revolution(&distances), &parameters);
+        scan.fill(&revolution(&distances), &OwnVehicle::default(), &parameters);
         let ranges: Vec<f32> = (0..4)
             .map(|column| scan.range_m()[scan.index(column, 8)])
             .collect();
-        assert_eq!(ranges, [0.0, MASKED, 1.0, MASKED]);
+        let centimetres: Vec<i32> = ranges.iter().map(|m| (100.0 * m).round() as i32).collect();
+        assert_eq!(centimetres, [0, -99, 100, -300]);
         assert_eq!(scan.returns(), 16);
     }
 
@@ -429,6 +443,7 @@ pub(crate) mod tests {
         let distances = vec![0; 10 * 32];
         scan.fill(
             &revolution(&distances),
+            &OwnVehicle::default(),
             &CloudParameters::profile(Profile::Default),
         );
         assert_eq!((scan.len(), scan.returns()), (160, 0));

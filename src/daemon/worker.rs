@@ -12,7 +12,9 @@ use super::now;
 use super::queue::{Job, Queue};
 use super::session::Sender;
 use crate::cloud::Dialect;
+use crate::ego::EgoReport;
 use crate::ground::Origin;
+use crate::odometry::Quality;
 use crate::pipeline::{Outcome, Pipeline, RevolutionReport};
 use crate::wire::Envelope;
 use crate::wire::envelope::Postmark;
@@ -31,6 +33,7 @@ pub(super) struct Worker<'a> {
     latency: Latency,
     statuses: u64,
     dialect: Option<Dialect>,
+    ego: Option<EgoReport>,
     dropped_revolutions: u64,
     log: FaultLog,
     frame: Vec<u8>,
@@ -56,6 +59,7 @@ impl<'a> Worker<'a> {
             latency: Latency::default(),
             statuses: 0,
             dialect: None,
+            ego: None,
             dropped_revolutions: 0,
             log: FaultLog::default(),
             frame: vec![],
@@ -167,6 +171,34 @@ impl<'a> Worker<'a> {
             self.log.note("time_jump", || {
                 format!("to {:.3} s: tracks begin anew", report.time.seconds())
             });
+        }
+        if let Some(last) = self.ego.replace(report.ego) {
+            if last.source != report.ego.source {
+                info!("poses: {}", report.ego.source);
+            }
+            if last.jumps != report.ego.jumps {
+                let source = report.ego.source;
+                self.log.note("pose_jump", || {
+                    format!("{source} jumped: the local frame is tied to the odometry anew")
+                });
+            }
+            if last.restarts != report.ego.restarts {
+                self.log.note("odometry_restart", || {
+                    "what is seen did not fit for too long: a new map begins".into()
+                });
+            }
+        }
+        match report.ego.odometry.quality {
+            Quality::Off | Quality::Begun | Quality::Following => {}
+            Quality::Degenerate => self.log.note("odometry_degenerate", || {
+                format!(
+                    "what is seen tells the place to {:.1} m only: prediction and poses ({}) tell the rest",
+                    report.ego.odometry.deviation_m, report.ego.source
+                )
+            }),
+            Quality::Lost => self.log.note("odometry_lost", || {
+                "what is seen does not fit what was seen before".into()
+            }),
         }
         match report.ground.origin {
             Origin::Found => {}

@@ -13,6 +13,12 @@ pub(super) trait Blend: Copy {
     fn blend(&self, other: &Self, share: f64) -> Self;
 }
 
+impl Blend for f64 {
+    fn blend(&self, other: &Self, share: f64) -> Self {
+        self + share * (other - self)
+    }
+}
+
 /// Values of the last second, oldest first.
 #[derive(Debug, Clone)]
 pub(super) struct History<T> {
@@ -103,12 +109,6 @@ impl<T: Blend> History<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    impl Blend for f64 {
-        fn blend(&self, other: &Self, share: f64) -> Self {
-            self + share * (other - self)
-        }
-    }
 
     fn at(milliseconds: i64) -> Time {
         Time::from_micros(1_000 * milliseconds)

@@ -1,8 +1,10 @@
-//! Where the vehicle is: its pose at any time, from whatever messages the session has.
+//! Where the vehicle is: in a frame that never jumps, by odometry, and in the world, by what the session says.
 //!
-//! `reading` brings every message to one set of units, `geodesy` WGS84 to the local frame,
-//! `history` reads between and beyond what was heard, `sweep` is the answer. This file chooses
-//! among the sources.
+//! `reading` brings every pose message to one set of units, `geodesy` WGS84 to the local frame,
+//! `history` reads between and beyond what was heard, `sources` chooses among them, `rates` learns what speeds mean. The odometry frame is tied to
+//! the local frame by an `anchor` (the frames `odom` and `map` of ROS REP 105). `sweep` is the answer.
+
+mod anchor;
 
 pub mod geodesy;
 
@@ -10,19 +12,28 @@ mod history;
 
 mod pose;
 
+mod rates;
+
 mod reading;
+
+mod sources;
 
 mod sweep;
 
+pub use anchor::Anchor;
 pub use pose::{Placement, Pose, wrapped_rad};
 pub use sweep::{Frame, Sweep};
 
+use crate::cloud::Scan;
+use crate::geometry::{Outline, Rectangle};
+use crate::odometry::{Odometry, OdometryReport};
 use crate::parameter::{choices, parameters};
 use crate::time::{Span, Time};
 use crate::wire::{Envelope, WireError};
-use geodesy::{Geodetic, LocalFrame};
-use history::{Blend, History};
-use reading::{Direction, Reading, Source};
+use anchor::Anchoring;
+use rates::Rates;
+use reading::Source;
+use sources::Sources;
 use sweep::KNOTS;
 
 choices! {
@@ -39,10 +50,17 @@ choices! {
 }
 
 parameters! {
-    /// The vehicle's pose. Without a source of poses everything works in the sensor frame.
+    /// The vehicle's motion: by odometry, and by the poses that the session has.
     pub struct EgoParameters "ego" {
+        /// Whether the sensor's motion is found from what it sees. Without it poses alone tell it, their
+        /// noise and jumps go into everything, and without poses the sensor is taken for one that stands.
+        odometry: bool = true, thesis false, "";
         /// Whether poses are used at all.
         use_poses: bool = true, "";
+        /// Standard deviation of the places that poses give, from one revolution to the next.
+        pose_deviation_m: f64 = 0.1, in 0.001..=100.0, "m";
+        /// The same of their headings.
+        pose_deviation_deg: f64 = 0.5, in 0.01..=45.0, "degrees";
         /// Unit of headings in GeodeticHeadingReading and Geolocation.
         heading_unit: HeadingUnit = HeadingUnit::Auto, "";
         /// Whether the local frame lies around the reference below; else around the first fix.
@@ -61,52 +79,13 @@ parameters! {
         sensor_up_m: f64 = 0.0, in -5.0..=5.0, "m";
         /// How far the sensor looks to the left of the vehicle's forward.
         sensor_yaw_deg: f64 = 0.0, in -180.0..=180.0, "degrees";
-        /// How long a pose is carried on when no new one comes; then it is lost, and the local
-        /// frame is the sensor's again.
+        /// How long a pose is carried on when no new one comes; then odometry goes on alone.
         extrapolation_s: f64 = 0.5, in 0.0..=0.9, "s";
         /// A pose that lies this far from where the vehicle was expected is a jump of the
-        /// source: the world keeps its place around the vehicle, and the map begins anew.
+        /// source: when it persists, the local frame is tied to the world anew, and nothing else changes.
         jump_m: f64 = 2.0, in 0.1..=1000.0, "m";
         /// The same for its direction.
         jump_deg: f64 = 15.0, in 1.0..=180.0, "degrees";
-    }
-}
-
-/// The ego step: hears poses, tells where the sensor was.
-#[derive(Debug, Clone)]
-pub struct Ego {
-    parameters: EgoParameters,
-    local: Option<LocalFrame>,
-    heading_unit: HeadingUnit,
-    applanix: History<Pose>,
-    geolocation: History<Pose>,
-    places: History<[f64; 3]>,
-    headings: History<Yaw>,
-    simulation: History<Pose>,
-    current: Option<Source>,
-    epoch: u32,
-    jumps: u64,
-}
-
-/// An angle that is blended the shorter way round.
-#[derive(Debug, Clone, Copy)]
-struct Yaw(f64);
-
-impl Blend for Yaw {
-    fn blend(&self, other: &Self, share: f64) -> Self {
-        Self(wrapped_rad(self.0 + share * wrapped_rad(other.0 - self.0)))
-    }
-}
-
-impl Blend for Pose {
-    fn blend(&self, other: &Self, share: f64) -> Self {
-        self.toward(other, share)
-    }
-}
-
-impl Blend for [f64; 3] {
-    fn blend(&self, other: &Self, share: f64) -> Self {
-        [0, 1, 2].map(|axis| self[axis] + share * (other[axis] - self[axis]))
     }
 }
 
@@ -121,42 +100,99 @@ pub enum Heard {
     Implausible,
 }
 
-/// The order in which sources are asked.
-const SOURCES: [Source; 4] = [
-    Source::Applanix,
-    Source::Geolocation,
-    Source::Separate,
-    Source::Simulation,
-];
+/// The ego step: hears poses, follows the sensor, tells where it was.
+#[derive(Debug, Clone)]
+pub struct Ego {
+    parameters: EgoParameters,
+    sources: Sources,
+    odometry: Odometry,
+    anchoring: Option<Anchoring>,
+    rates: Rates,
+    /// Jumps before the odometry frame began anew.
+    past_jumps: u64,
+    /// The source of poses in use.
+    source: Option<Source>,
+    /// When the odometry frame began.
+    begun: Option<Time>,
+    epoch: u32,
+    /// Columns in which something that moves may be, and its outlines.
+    marked: Vec<bool>,
+    outlines: Vec<Outline>,
+}
+
+/// What the ego step says of itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EgoReport {
+    /// What became of the last revolution.
+    pub odometry: OdometryReport,
+    /// How often the odometry frame began anew.
+    pub restarts: u32,
+    /// The source of poses in use: none, or its name.
+    pub source: &'static str,
+    /// How far it and the odometry were apart when they were compared last.
+    pub disagreement_m: f64,
+    /// How often a source jumped and stayed there.
+    pub jumps: u64,
+}
+
+/// Age of the odometry frame up to which it begins anew, along the axes of the local frame, when a first pose comes.
+const YOUNG: Span = Span::from_micros(3_000_000);
+
+impl EgoParameters {
+    /// The sensor's pose on a vehicle.
+    fn sensor(&self, vehicle: &Pose) -> Pose {
+        vehicle.mounted(self.mount_m(), self.sensor_yaw_deg.to_radians())
+    }
+
+    /// The pose of a vehicle by that of its sensor.
+    fn vehicle(&self, sensor: &Pose) -> Pose {
+        let turned = sensor.mounted([0.0; 3], -self.sensor_yaw_deg.to_radians());
+        turned.mounted(self.mount_m().map(|metres| -metres), 0.0)
+    }
+
+    fn mount_m(&self) -> [f64; 3] {
+        [self.sensor_forward_m, self.sensor_left_m, self.sensor_up_m]
+    }
+}
 
 impl Ego {
-    /// An ego step that has heard nothing.
+    /// An ego step that has heard and seen nothing.
     pub fn new(parameters: &EgoParameters) -> Self {
-        let reference = Geodetic {
-            latitude_deg: parameters.reference_latitude_deg,
-            longitude_deg: parameters.reference_longitude_deg,
-            altitude_m: parameters.reference_altitude_m,
-        };
         Self {
-            local: parameters
-                .fixed_reference
-                .then(|| LocalFrame::around(reference)),
-            heading_unit: parameters.heading_unit,
             parameters: parameters.clone(),
-            applanix: History::default(),
-            geolocation: History::default(),
-            places: History::default(),
-            headings: History::default(),
-            simulation: History::default(),
-            current: None,
+            sources: Sources::new(parameters),
+            odometry: Odometry::default(),
+            anchoring: None,
+            rates: Rates::new(),
+            past_jumps: 0,
+            source: None,
+            begun: None,
             epoch: 0,
-            jumps: 0,
+            marked: vec![],
+            outlines: vec![],
         }
     }
 
-    /// Jumps of a source so far.
-    pub fn jumps(&self) -> u64 {
-        self.jumps
+    /// Forgets where the sensor was, for a session that begins anew.
+    pub fn reset(&mut self) {
+        self.odometry.begin(&Pose::SENSOR.rigid(), None);
+        self.keep_jumps();
+        self.anchoring = None;
+        self.begun = None;
+        self.epoch = self.epoch.wrapping_add(1);
+    }
+
+    /// What is to be said of the last revolution.
+    pub fn report(&self) -> EgoReport {
+        let anchoring = self.anchoring.as_ref();
+        let jumps = anchoring.map_or(self.sources.jumps(), Anchoring::jumps);
+        EgoReport {
+            odometry: *self.odometry.report(),
+            restarts: self.odometry.epoch(),
+            source: self.source.map_or("none", Source::name),
+            disagreement_m: anchoring.map_or(0.0, Anchoring::off_m),
+            jumps: self.past_jumps + jumps,
+        }
     }
 
     /// Takes an envelope, if it holds a pose.
@@ -164,195 +200,117 @@ impl Ego {
     /// # Errors
     /// [`WireError`] when its bytes do not fit its message.
     pub fn hear(&mut self, envelope: &Envelope<'_>) -> Result<Heard, WireError> {
-        let Some(reading) = Reading::decode(envelope)? else {
-            return Ok(Heard::Nothing);
-        };
-        if !reading.is_plausible() {
-            return Ok(Heard::Implausible);
-        }
-        if self.parameters.use_poses {
-            self.take(envelope.time(), reading);
-        }
-        Ok(Heard::Pose)
+        self.sources.hear(envelope)
     }
 
-    fn take(&mut self, time: Time, reading: Reading) {
-        match reading {
-            Reading::Fix(source, place, direction) => {
-                let yaw_rad = self.yaw_rad(direction);
-                let position_m = self.local_m(place);
-                self.push_pose(
-                    source,
-                    time,
-                    Pose {
-                        position_m,
-                        yaw_rad,
-                    },
-                );
-            }
-            Reading::Local(source, pose) => self.push_pose(source, time, pose),
-            Reading::Place(place) => {
-                let position_m = self.local_m(place);
-                let expected = self.places.at(time, self.limit());
-                if expected.is_some_and(|from| self.is_far(from, position_m)) {
-                    self.places.clear();
-                    self.jump(Source::Separate);
-                } else if self.places.is_stale(time, self.limit()) {
-                    self.places.clear();
-                    self.begin_anew(Source::Separate);
-                }
-                self.places.push(time, position_m);
-            }
-            Reading::Heading(direction) => {
-                let yaw_rad = self.yaw_rad(direction);
-                let expected = self.headings.at(time, self.limit());
-                if expected.is_some_and(|Yaw(from_rad)| self.is_turned(from_rad, yaw_rad)) {
-                    self.headings.clear();
-                    self.jump(Source::Separate);
-                }
-                self.headings.push(time, Yaw(yaw_rad));
-            }
-            Reading::Rate => {}
-        }
-    }
-
-    fn push_pose(&mut self, source: Source, time: Time, pose: Pose) {
-        let limit = self.limit();
-        let jumped = self.history(source).at(time, limit).is_some_and(|from| {
-            self.is_far(from.position_m, pose.position_m)
-                || self.is_turned(from.yaw_rad, pose.yaw_rad)
-        });
-        let is_stale = self.history(source).is_stale(time, limit);
-        if jumped {
-            self.jump(source);
-        } else if is_stale {
-            self.begin_anew(source);
-        }
-        let history = match source {
-            Source::Applanix => &mut self.applanix,
-            Source::Geolocation => &mut self.geolocation,
-            Source::Separate | Source::Simulation => &mut self.simulation,
-        };
-        if jumped || is_stale {
-            history.clear();
-        }
-        history.push(time, pose);
-    }
-
-    fn history(&self, source: Source) -> &History<Pose> {
-        match source {
-            Source::Applanix => &self.applanix,
-            Source::Geolocation => &self.geolocation,
-            Source::Separate | Source::Simulation => &self.simulation,
-        }
-    }
-
-    fn limit(&self) -> Span {
-        Span::from_seconds(self.parameters.extrapolation_s)
-    }
-
-    fn is_far(&self, from: [f64; 3], to: [f64; 3]) -> bool {
-        libm::hypot(to[0] - from[0], to[1] - from[1]) > self.parameters.jump_m
-    }
-
-    fn is_turned(&self, from_rad: f64, to_rad: f64) -> bool {
-        wrapped_rad(to_rad - from_rad).abs() > self.parameters.jump_deg.to_radians()
-    }
-
-    /// A source began anew; that of another one than is used concerns nobody.
-    fn jump(&mut self, source: Source) {
-        self.jumps += 1;
-        self.begin_anew(source);
-    }
-
-    /// What a source says now cannot be compared with what it said before.
-    fn begin_anew(&mut self, source: Source) {
-        if self.current == Some(source) {
-            self.epoch = self.epoch.wrapping_add(1);
-        }
-    }
-
-    fn local_m(&mut self, place: Geodetic) -> [f64; 3] {
-        self.local
-            .get_or_insert_with(|| LocalFrame::around(place))
-            .local_m(place)
-    }
-
-    /// Radians lie within half a turn to either side of north, degrees within a whole one.
-    fn yaw_rad(&mut self, direction: Direction) -> f64 {
-        if let (Direction::Unknown(value), HeadingUnit::Auto) = (direction, self.heading_unit) {
-            /// A heading in radians at most, with room for its rounding.
-            const MOST_RAD: f64 = 3.2;
-            if value > MOST_RAD {
-                self.heading_unit = HeadingUnit::Degrees;
-                // Those before were read as radians.
-                self.headings.clear();
-                self.geolocation.clear();
-                self.begin_anew(Source::Separate);
-                self.begin_anew(Source::Geolocation);
-            } else if value < 0.0 {
-                self.heading_unit = HeadingUnit::Radians;
-            }
-        }
-        direction.yaw_rad(self.heading_unit)
-    }
-
-    /// The vehicle's pose from one source.
-    fn pose_from(&self, source: Source, time: Time) -> Option<Pose> {
-        let limit = self.limit();
-        if source != Source::Separate {
-            return self.history(source).at(time, limit);
-        }
-        let position_m = self.places.at(time, limit)?;
-        let Yaw(yaw_rad) = self.headings.at(time, limit)?;
-        Some(Pose {
-            position_m,
-            yaw_rad,
-        })
-    }
-
-    /// The sensor's poses from `begin` to `end` of a sweep. Poses are taken as the most trusted
-    /// source gives them; when it changes, or is lost or found, a new epoch begins.
-    pub fn sweep(&mut self, begin: Time, end: Time) -> Sweep {
-        let known = SOURCES
-            .into_iter()
-            .find_map(|source| self.pose_from(source, end).map(|pose| (source, pose)));
-        let source = known.map(|(source, _)| source);
-        if source != self.current {
-            self.current = source;
-            self.epoch = self.epoch.wrapping_add(1);
-        }
-        let Some((source, vehicle)) = known else {
-            return Sweep::still(self.epoch);
-        };
-        let EgoParameters {
-            sensor_forward_m,
-            sensor_left_m,
-            sensor_up_m,
-            sensor_yaw_deg,
-            ..
-        } = self.parameters;
-        let mounted = |pose: Pose| {
-            pose.mounted(
-                [sensor_forward_m, sensor_left_m, sensor_up_m],
-                sensor_yaw_deg.to_radians(),
-            )
-        };
-        let swept_s = (end - begin).seconds();
-        let knots = std::array::from_fn(|knot| {
-            let share = knot as f64 / (KNOTS - 1) as f64;
-            let time = begin + Span::from_seconds(share * swept_s);
-            mounted(self.pose_from(source, time).unwrap_or(vehicle))
-        });
+    /// Where the sensor is expected at the end of a scan.
+    pub fn expect(&self, scan: &Scan) -> Sweep {
         Sweep {
-            frame: match source {
-                Source::Simulation => Frame::Simulation,
-                _ => Frame::Earth,
-            },
-            epoch: self.epoch,
-            vehicle: Some(vehicle),
-            sensor: mounted(vehicle),
+            sensor: Pose::of(&self.odometry.expected(scan)),
+            ..Sweep::still(self.epoch)
+        }
+    }
+
+    /// Takes a scan in, and tells where the sensor was meanwhile. What `moving` boxes hold, in the sensor frame at the end
+    /// of the scan, tells nothing of the sensor's motion.
+    pub fn follow(&mut self, scan: &Scan, moving: &[Rectangle]) -> Sweep {
+        let swept = Span::from_seconds(-scan.duration_s());
+        let (begin, end) = (scan.time() + swept, scan.time());
+        if !self.parameters.odometry {
+            self.source = self.sources.best(end).map(|(source, _)| source);
+            return self.sources.sweep(begin, end);
+        }
+        let middle = scan.time() + Span::from_seconds(-0.5 * scan.duration_s());
+        let heard = self.sources.best(middle);
+        self.source = heard.map(|(source, _)| source);
+        let sensor = heard.map(|(source, vehicle)| (source, self.parameters.sensor(&vehicle)));
+        let is_young = self.begun.is_none_or(|begun| (end - begun) < YOUNG);
+        let begins = self.odometry.begins() || (self.anchoring.is_none() && is_young);
+        if let (Some((source, sensor)), true) = (&sensor, begins) {
+            if !self.odometry.begins() {
+                self.epoch = self.epoch.wrapping_add(1);
+            }
+            self.keep_jumps();
+            let before = self.sources.pose_from(*source, middle + swept);
+            let velocity = before.map(|before| {
+                let before = self.parameters.sensor(&before).rigid();
+                before.step_to(&sensor.rigid()) / scan.duration_s()
+            });
+            self.odometry.begin(&sensor.rigid(), velocity);
+            self.anchoring = Some(Anchoring::begin(source.frame()));
+        }
+        self.begun.get_or_insert(end);
+        self.mark(scan, moving);
+        let (marked, outlines) = (&self.marked, &self.outlines);
+        self.odometry.predict(scan);
+        if let (Some((_, sensor)), Some(anchoring)) = (&sensor, &self.anchoring) {
+            anchoring.guide(&mut self.odometry, sensor, &self.parameters);
+        }
+        let [speed, yaw_rate] = self.sources.rates(middle);
+        let ahead_rad = self.ahead_rad();
+        self.rates
+            .guide(&mut self.odometry, speed, yaw_rate, ahead_rad);
+        self.odometry.process(scan, |column, [x, y, _]| {
+            let at_m = [f64::from(x), f64::from(y)];
+            !marked[column] || outlines.iter().all(|outline| !outline.contains(at_m))
+        });
+        self.rates
+            .learn(&self.odometry, speed, yaw_rate, self.ahead_rad());
+        if let Some((source, sensor)) = &sensor {
+            let pose = Pose::of(&self.odometry.pose_at(scan, -0.5 * scan.duration_s()));
+            self.anchoring
+                .get_or_insert_with(|| Anchoring::at(source.frame(), &pose, sensor))
+                .take(middle, &pose, source.frame(), sensor, &self.parameters);
+        }
+        self.sweep(scan)
+    }
+
+    /// Marks the columns in which something that moves may be.
+    fn mark(&mut self, scan: &Scan, moving: &[Rectangle]) {
+        self.marked.clear();
+        self.marked.resize(scan.columns(), false);
+        self.outlines.clear();
+        self.outlines.extend(moving.iter().map(Rectangle::outline));
+        for rectangle in moving {
+            match scan.columns_across(&rectangle.corners()) {
+                None => self.marked.fill(true),
+                Some(_) => {
+                    for columns in scan.stretches_across(&rectangle.corners()) {
+                        self.marked[columns].fill(true);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Where the vehicle looks in the odometry frame.
+    fn ahead_rad(&self) -> f64 {
+        Pose::of(&self.odometry.pose()).yaw_rad - self.parameters.sensor_yaw_deg.to_radians()
+    }
+
+    fn keep_jumps(&mut self) {
+        self.past_jumps += self.anchoring.as_ref().map_or(0, Anchoring::jumps);
+    }
+
+    fn sweep(&self, scan: &Scan) -> Sweep {
+        let knots = std::array::from_fn(|knot| {
+            let left = 1.0 - knot as f64 / (KNOTS - 1) as f64;
+            Pose::of(&self.odometry.pose_at(scan, -left * scan.duration_s()))
+        });
+        let attitude = self.odometry.pose_at(scan, 0.0);
+        let sensor = knots[KNOTS - 1];
+        let (frame, anchor) = self
+            .anchoring
+            .as_ref()
+            .map_or((Frame::Odometry, Anchor::IDENTITY), Anchoring::anchor);
+        Sweep {
+            frame,
+            epoch: self.epoch.wrapping_add(self.odometry.epoch()),
+            vehicle: Some(self.parameters.vehicle(&anchor.pose(&sensor))),
+            sensor,
+            attitude,
             knots,
+            anchor,
         }
     }
 }

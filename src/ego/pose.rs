@@ -2,6 +2,10 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use nalgebra::Vector3;
+
+use crate::geometry::{Rigid, turn};
+
 /// An angle in (-pi, pi].
 pub fn wrapped_rad(angle_rad: f64) -> f64 {
     angle_rad - TAU * libm::ceil((angle_rad - PI) / TAU)
@@ -47,6 +51,24 @@ impl Pose {
                 from + share * (to - from)
             }),
             yaw_rad: wrapped_rad(self.yaw_rad + share * turn_rad),
+        }
+    }
+
+    /// What of a place and direction in space is one in the plane: the heading of what looks forward.
+    pub fn of(rigid: &Rigid) -> Self {
+        let ahead = rigid.rotation.column(1);
+        Self {
+            position_m: rigid.translation_m.into(),
+            yaw_rad: libm::atan2(ahead.y, ahead.x),
+        }
+    }
+
+    /// The same in space: level.
+    pub fn rigid(&self) -> Rigid {
+        let upright = Vector3::new(0.0, 0.0, self.yaw_rad - FRAC_PI_2);
+        Rigid {
+            rotation: turn(&upright),
+            translation_m: self.position_m.into(),
         }
     }
 

@@ -1,7 +1,7 @@
 //! What each pose message says, in one set of units.
 
 use super::geodesy::Geodetic;
-use super::{HeadingUnit, Pose, wrapped_rad};
+use super::{Frame, HeadingUnit, Pose, wrapped_rad};
 use crate::wire::{Envelope, Message, WireError, pose};
 
 /// The roll by which the thesis' simulator marks that latitude and longitude are metres.
@@ -18,9 +18,10 @@ pub(super) enum Reading {
     Heading(Direction),
     /// A pose in a frame of the sender's own.
     Local(Source, Pose),
-    /// Speeds and rates: read for their soundness only, because services disagree on what they
-    /// mean, and positions at any useful rate give them anyway.
-    Rate,
+    /// Along the vehicle's forward, as it is sent: m/s.
+    Speed(f64),
+    /// About the upright axis, as it is sent: services disagree on unit and sign.
+    YawRate(f64),
 }
 
 /// Where whole poses come from, the more trusted first.
@@ -31,6 +32,26 @@ pub(super) enum Source {
     /// Place and heading from two messages.
     Separate,
     Simulation,
+}
+
+impl Source {
+    /// How Status names it.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Applanix => "applanix",
+            Self::Geolocation => "geolocation",
+            Self::Separate => "wgs84",
+            Self::Simulation => "simulation",
+        }
+    }
+
+    /// The frame of its poses.
+    pub(super) fn frame(self) -> Frame {
+        match self {
+            Self::Simulation => Frame::Simulation,
+            Self::Applanix | Self::Geolocation | Self::Separate => Frame::Earth,
+        }
+    }
 }
 
 /// Clockwise from north, in a unit that may have to be guessed.
@@ -100,12 +121,12 @@ impl Reading {
                 )
             }
             pose::GroundSpeedReading::ID => {
-                message::<pose::GroundSpeedReading>(envelope)?;
-                Self::Rate
+                let reading: pose::GroundSpeedReading = message(envelope)?;
+                Self::Speed(reading.ground_speed.into())
             }
             pose::AngularVelocityReading::ID => {
-                message::<pose::AngularVelocityReading>(envelope)?;
-                Self::Rate
+                let reading: pose::AngularVelocityReading = message(envelope)?;
+                Self::YawRate(reading.angular_velocity_z.into())
             }
             _ => return Ok(None),
         }))
@@ -115,6 +136,9 @@ impl Reading {
     pub(super) fn is_plausible(&self) -> bool {
         /// Beyond this a local frame has lost its meaning.
         const FARTHEST_M: f64 = 1e6;
+        /// No vehicle with a lidar is faster, nor turns faster, be it in degrees.
+        const FASTEST_MPS: f64 = 150.0;
+        const FASTEST_RATE: f64 = 720.0;
         let is_direction = |direction: &Direction| match direction {
             Direction::Degrees(value) | Direction::Unknown(value) => value.abs() <= 720.0,
         };
@@ -129,7 +153,8 @@ impl Reading {
                         .iter()
                         .all(|metres| metres.abs() <= FARTHEST_M)
             }
-            Self::Rate => true,
+            Self::Speed(mps) => mps.abs() <= FASTEST_MPS,
+            Self::YawRate(rate) => rate.abs() <= FASTEST_RATE,
         }
     }
 }

@@ -1,13 +1,14 @@
 //! Where the sensor is while it turns once.
 
-use super::{Placement, Pose};
+use super::{Anchor, Placement, Pose};
+use crate::geometry::Rigid;
 
 /// The frame in which states are published.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Frame {
-    /// The sensor's, because no pose is known.
+    /// The odometry's own, because no pose is known.
     #[default]
-    Sensor,
+    Odometry,
     /// East, north, up around a WGS84 reference.
     Earth,
     /// A simulation's own.
@@ -18,24 +19,28 @@ impl Frame {
     /// The number in `kreisel.ObjectList`.
     pub const fn number(self) -> u32 {
         match self {
-            Self::Sensor => 0,
+            Self::Odometry => 0,
             Self::Earth => 1,
             Self::Simulation => 2,
         }
     }
 }
 
-/// The sensor's poses during a sweep.
+/// The sensor's poses during a sweep, in the odometry frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sweep {
-    /// The frame that they are in, and which of its stretches between jumps.
+    /// The frame that states are published in.
     pub frame: Frame,
-    /// Counts jumps and losses of the source: poses of different epochs cannot be compared.
+    /// Where the odometry frame lies in it.
+    pub anchor: Anchor,
+    /// Counts how often the odometry frame began anew: poses of different epochs cannot be compared.
     pub epoch: u32,
-    /// The vehicle's pose at the end, if it is known.
+    /// The vehicle's pose at the end in the local frame, if it is known.
     pub vehicle: Option<Pose>,
     /// The sensor's pose at the end.
     pub sensor: Pose,
+    /// The same in space.
+    pub attitude: Rigid,
     pub(super) knots: [Pose; KNOTS],
 }
 
@@ -47,11 +52,33 @@ impl Sweep {
     /// A sweep from one place.
     pub const fn still(epoch: u32) -> Self {
         Self {
-            frame: Frame::Sensor,
+            frame: Frame::Odometry,
+            anchor: Anchor::IDENTITY,
             epoch,
             vehicle: None,
             sensor: Pose::SENSOR,
+            attitude: Rigid::IDENTITY,
             knots: [Pose::SENSOR; KNOTS],
+        }
+    }
+
+    /// The sensor's pose at the end in the local frame.
+    pub fn local_sensor(&self) -> Pose {
+        self.anchor.pose(&self.sensor)
+    }
+
+    /// The same in space.
+    pub fn local_attitude(&self) -> Rigid {
+        let turned = Pose {
+            position_m: [0.0; 3],
+            yaw_rad: Pose::SENSOR.yaw_rad + self.anchor.yaw_rad,
+        };
+        Rigid {
+            rotation: turned.rigid().rotation * self.attitude.rotation,
+            translation_m: self
+                .anchor
+                .place_m(self.attitude.translation_m.into())
+                .into(),
         }
     }
 
@@ -64,6 +91,12 @@ impl Sweep {
     pub fn velocity_mps(&self, duration_s: f64) -> [f64; 2] {
         let [begin_m, end_m] = [&self.knots[0], &self.sensor].map(|pose| pose.position_m);
         [0, 1].map(|axis| (end_m[axis] - begin_m[axis]) / duration_s)
+    }
+
+    /// How far the sensor went during it.
+    pub fn way_m(&self) -> f64 {
+        let [x, y] = self.velocity_mps(1.0);
+        libm::hypot(x, y)
     }
 
     /// The sensor's pose at a share of the sweep, 0 its begin and 1 its end.

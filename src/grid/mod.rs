@@ -29,7 +29,7 @@ pub use map::{Map, TILE_CELLS, Tile};
 use std::ops::Range;
 
 use crate::cloud::{CAPACITY, Scan};
-use crate::ego::{Placement, Sweep};
+use crate::ego::{Anchor, Placement, Sweep};
 use crate::ground::Plane;
 use crate::parameter::{choices, parameters};
 use crate::time::Time;
@@ -122,6 +122,7 @@ pub struct Grid {
     filter: Filter,
     map: Map,
     map_id: u32,
+    anchor: Anchor,
     epoch: Option<u32>,
     /// Counts the revolutions of the map.
     revolution: u32,
@@ -170,6 +171,7 @@ impl Grid {
             filter: Filter::new(parameters),
             map: Map::new(map_side),
             map_id: 0,
+            anchor: Anchor::IDENTITY,
             epoch: None,
             revolution: 0,
             updates: Updates::new(parameters),
@@ -191,6 +193,11 @@ impl Grid {
     /// The map as it is.
     pub fn map(&self) -> &Map {
         &self.map
+    }
+
+    /// Where the odometry frame, in which the map is, lies in the local frame.
+    pub fn anchor(&self) -> Anchor {
+        self.anchor
     }
 
     /// Tells maps apart: another one begins with the session, and with a jump of the poses or of
@@ -251,6 +258,7 @@ impl Grid {
         filter::free(&self.filter, &self.window, &view, &mut self.map);
         self.filter
             .occupy(&self.hits, &mut self.window, self.revolution, &mut self.map);
+        self.anchor = sweep.anchor;
         let cell_m = self.parameters.cell_m;
         for object in perceived.objects {
             if moving::moves(object, &self.parameters) {
@@ -362,6 +370,9 @@ impl Grid {
                 tile_y: place[1],
                 cells_per_side: TILE_CELLS as u32,
                 cell_size: self.parameters.cell_m,
+                anchor_x: sweep.anchor.origin_m[0],
+                anchor_y: sweep.anchor.origin_m[1],
+                anchor_yaw: sweep.anchor.yaw_rad,
                 ..GridTile::default()
             };
             let message = message.with_cells(std::mem::take(&mut tile.encoded));

@@ -22,10 +22,10 @@ mod votes;
 pub use plane::Plane;
 
 use crate::cloud::{CAPACITY, MAX_LAYERS, Scan};
+use crate::geometry::Rectangle;
 use crate::marks;
 use crate::parameter::{choices, parameters};
 use crate::random::Random;
-use crate::track::Rectangle;
 use minima::Minima;
 use moments::{Positions, moments_near};
 use passes::Band;

@@ -6,7 +6,7 @@ use multiversion::multiversion;
 
 use super::lowest::NO_LEVEL_M;
 use crate::cloud::{MAX_LAYERS, Scan};
-use crate::track::{Outline, Rectangle};
+use crate::geometry::{Outline, Rectangle};
 
 /// Where a vehicle stands, in the sensor frame.
 #[derive(Debug, Clone, Copy)]

@@ -2,10 +2,10 @@
 
 use multiversion::multiversion;
 
-use super::Outline;
 use super::forecast::Forecasts;
 use super::placing::Placed;
 use crate::float::least;
+use crate::geometry::Outline;
 
 /// For every return of a patch the track that has it. Its buffers are made once.
 #[derive(Debug, Clone, Default)]
@@ -130,7 +130,7 @@ fn claim(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::Rectangle;
+    use crate::geometry::Rectangle;
     use crate::track::forecast::Forecast;
 
     fn at(x: f32) -> Placed {

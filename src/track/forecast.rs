@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 use super::nearby::Discs;
 use super::patches::Patch;
 use super::road_user::Track;
-use super::{Outline, Rectangle};
+use crate::geometry::{Outline, Rectangle};
 
 /// Where a track is expected.
 #[derive(Debug, Clone)]

@@ -49,8 +49,6 @@ mod people;
 
 mod placing;
 
-mod rectangle;
-
 mod road_user;
 
 mod seam;
@@ -70,16 +68,17 @@ mod trail;
 mod view;
 
 pub use class::Class;
-pub use rectangle::{Outline, Rectangle};
 
 use crate::cloud::Scan;
 use crate::cluster::Clusters;
-use crate::ego::{Placement, Pose, Sweep};
+use crate::ego::{Anchor, Placement, Pose, Sweep};
+use crate::geometry::Rectangle;
 use crate::ground::GroundReport;
 use crate::parameter::{choices, parameters};
 use crate::time::Time;
 use nearest::NearestTracker;
 use objects::ObjectTracker;
+use road_user::Track;
 
 choices! {
     /// How clusters become objects.
@@ -118,7 +117,7 @@ parameters! {
     }
 }
 
-/// One road user, valid at the end of the sweep, in the local frame.
+/// One road user, valid at the end of the sweep, in the odometry frame until it is published.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Object {
     /// Identity.
@@ -162,6 +161,21 @@ pub struct Object {
 }
 
 impl Object {
+    /// The same in the local frame, of one in the odometry frame.
+    pub fn in_local_frame(&self, anchor: &Anchor) -> Self {
+        let (sine, cosine) = libm::sincos(anchor.yaw_rad);
+        let [x, y] = self.position_deviation_m;
+        Self {
+            centre_m: anchor.place_m(self.centre_m),
+            yaw_rad: anchor.yaw_rad(self.yaw_rad),
+            position_deviation_m: [
+                libm::hypot(x * cosine, y * sine),
+                libm::hypot(x * sine, y * cosine),
+            ],
+            ..self.clone()
+        }
+    }
+
     /// Its box from above.
     pub fn rectangle(&self) -> Rectangle {
         Rectangle {
@@ -225,16 +239,30 @@ impl Tracker {
         }
     }
 
-    /// Where vehicles that drive will be at `end`, in the sensor frame of a sweep: what is met
-    /// there is no ground.
-    pub fn expect(&mut self, end: Time, sweep: &Sweep) -> &[Rectangle] {
+    /// Where what moves will be at `end`, in the sensor frame of a sweep: what is met there tells nothing of the
+    /// sensor's own motion.
+    pub fn expect_moving(&mut self, end: Time, sweep: &Sweep) -> &[Rectangle] {
+        self.expect(end, sweep, Track::is_surely_moving)
+    }
+
+    /// The same of vehicles that drive: what is met there is no ground.
+    pub fn expect_driving(&mut self, end: Time, sweep: &Sweep) -> &[Rectangle] {
+        self.expect(end, sweep, Track::is_moving_vehicle)
+    }
+
+    fn expect(
+        &mut self,
+        end: Time,
+        sweep: &Sweep,
+        is_meant: impl Fn(&Track) -> bool,
+    ) -> &[Rectangle] {
         self.expected.clear();
         let is_known = self
             .last_sweep
             .is_some_and(|last| last.epoch == sweep.epoch);
         if is_known && self.parameters.method == Method::Objects {
             self.by_object
-                .expect(end, &sweep.sensor, &mut self.expected);
+                .expect(end, &sweep.sensor, is_meant, &mut self.expected);
         }
         &self.expected
     }

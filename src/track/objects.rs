@@ -11,9 +11,10 @@ use super::nearby::Discs;
 use super::road_user::Track;
 use super::sight::Sight;
 use super::spots::Spot;
-use super::{Object, Outline, Rectangle, Scene, TrackParameters};
+use super::{Object, Scene, TrackParameters};
 use crate::cluster::Clusters;
 use crate::ego::{Pose, wrapped_rad};
+use crate::geometry::{Outline, Rectangle};
 use crate::time::{Span, Time};
 
 /// Tracks of road users.
@@ -62,14 +63,20 @@ impl ObjectTracker {
         &self.objects
     }
 
-    /// Adds the boxes of vehicles that drive, as they will be at a time, seen from the sensor.
-    pub(super) fn expect(&self, end: Time, sensor: &Pose, boxes: &mut Vec<Rectangle>) {
+    /// Adds the boxes of those that are meant, as they will be at a time, seen from the sensor.
+    pub(super) fn expect(
+        &self,
+        end: Time,
+        sensor: &Pose,
+        is_meant: impl Fn(&Track) -> bool,
+        boxes: &mut Vec<Rectangle>,
+    ) {
         let placement = sensor.placement();
-        let driving = self
+        let meant = self
             .tracks
             .iter()
-            .filter(|track| track.is_confirmed() && track.is_moving_vehicle());
-        boxes.extend(driving.map(|track| {
+            .filter(|track| track.is_confirmed() && is_meant(track));
+        boxes.extend(meant.map(|track| {
             let place = track.rectangle_at(end);
             Rectangle {
                 centre_m: placement.sensor_m(place.centre_m),

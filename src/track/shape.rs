@@ -3,11 +3,11 @@
 
 use std::ops::Range;
 
-use super::Rectangle;
 use super::look::Look;
 use super::spots::{Spot, places_m};
 use super::view::View;
 use crate::ego::wrapped_rad;
+use crate::geometry::Rectangle;
 
 /// What is known of an object's direction and size.
 #[derive(Debug, Clone)]

@@ -1,8 +1,8 @@
 //! Hidden or gone: what the rays say about a place where an object is expected.
 
-use super::Rectangle;
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::ego::Placement;
+use crate::geometry::Rectangle;
 
 /// Rays that should have met an object.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

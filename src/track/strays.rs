@@ -6,9 +6,9 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use super::Scene;
-use super::rectangle::Rectangle;
 use super::road_user::Track;
 use super::spots::Spot;
+use crate::geometry::Rectangle;
 use crate::marks::marked;
 
 /// Finds them. Its buffers are made once.

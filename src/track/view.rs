@@ -6,8 +6,8 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::look::Look;
-use super::rectangle::{Extent, turned};
 use super::spots::{Spot, places_m};
+use crate::geometry::{Extent, turned};
 
 /// A group of returns in the axes of a box.
 #[derive(Debug, Clone, Copy)]

@@ -17,14 +17,15 @@ const CELLS_M: std::ops::RangeInclusive<f64> = 0.001..=100.0;
 
 super::message! {
     /// A square tile of the occupancy grid, to be drawn without any other message: its
-    /// south-west corner is at tileX and tileY times cellsPerSide times cellSize in the frame.
+    /// south-west corner is at tileX and tileY times cellsPerSide times cellSize in the odometry frame,
+    /// which never jumps; the anchor says where that lies in the frame of the objects.
     pub struct GridTile = 2022 "kreisel.GridTile" {
         /// Tells maps apart: tiles of different ones do not fit together, a greater one is newer.
         1 => map_id: u32,
         /// Revolution of the map in which a cell last changed.
         2 => revision: u32,
-        /// 0: the sensor's frame, x right, y forward; 1: east, north, up around a WGS84
-        /// reference; 2: a simulation's own frame.
+        /// The frame of the objects. 0: the odometry frame itself, that of the sensor at the start, x right, y forward; 1:
+        /// east, north, up around a WGS84 reference; 2: a simulation's own frame.
         3 => frame: u32,
         /// Which tile, counted to the east.
         4 => tile_x: i32,
@@ -44,6 +45,12 @@ super::message! {
         9 => checksum: u32,
         /// The cells.
         10 => cells: Bytes,
+        /// Origin of the odometry frame in the frame, metres to the east; that of the newest tile holds for the whole map.
+        11 => anchor_x: f64,
+        /// Metres to the north.
+        12 => anchor_y: f64,
+        /// Direction of the odometry frame's x axis in the frame, counter-clockwise from east, radians.
+        13 => anchor_yaw: f64,
     }
 }
 

@@ -57,12 +57,12 @@ super::message! {
     pub struct ObjectList = 2021 "kreisel.ObjectList" {
         /// Counts the revolutions that were answered, from 0.
         1 => revolution: u32,
-        /// 0: the sensor's frame, x right, y forward; 1: east, north, up around a WGS84
-        /// reference; 2: a simulation's own frame.
+        /// 0: the odometry frame, that of the sensor at the start, x right, y forward; 1: east, north, up
+        /// around a WGS84 reference; 2: a simulation's own frame.
         2 => frame: u32,
-        /// Whether a pose of the vehicle was used.
+        /// Whether the vehicle's pose is known, from odometry or from messages.
         3 => ego_known: bool,
-        /// Pose of the vehicle in the local frame, metres.
+        /// Pose of the vehicle in the frame of the objects, metres.
         4 => ego_x: f64,
         /// Metres.
         5 => ego_y: f64,

@@ -65,5 +65,26 @@ super::message! {
         30 => version: String,
         /// The same as `latency_p99`, 99.9th percentile.
         31 => latency_p999: f32,
+        /// How the sensor's own motion is followed: off, begun, following, degenerate (what is seen does not tell all
+        /// of it), or lost.
+        32 => odometry: String,
+        /// Standard deviation of the place that a revolution gives, in the direction in which it tells least, metres.
+        33 => odometry_deviation: f32,
+        /// How often the odometry frame began anew, and with it tracks and map.
+        34 => odometry_restarts: u32,
+        /// The source of poses in use: none, applanix, geolocation, wgs84 or simulation.
+        35 => pose_source: String,
+        /// How far that source and the odometry were apart when they were compared last, metres.
+        36 => pose_disagreement: f32,
+        /// How often a source jumped and stayed there, so that the local frame was tied to the odometry anew.
+        37 => pose_jumps: u64,
+        /// How far the own vehicle is seen in the sensor frame, metres: lowest x; 0 with the next three if it is not seen.
+        38 => own_vehicle_left: f32,
+        /// Highest x.
+        39 => own_vehicle_right: f32,
+        /// Lowest y.
+        40 => own_vehicle_back: f32,
+        /// Highest y.
+        41 => own_vehicle_front: f32,
     }
 }

@@ -11,12 +11,12 @@ use super::claims::Claims;
 use super::forecast::Forecasts;
 use super::look::Look;
 use super::patches::{Patch, Placer};
-use super::rectangle::Extent;
 use super::road_user::Track;
 use super::spots::{Spot, bounds_m, places_m};
 use super::strays::Strays;
 use super::{Scene, TrackParameters, seam};
 use crate::cluster::Clusters;
+use crate::geometry::Extent;
 use crate::time::Time;
 
 /// The groups of a revolution.

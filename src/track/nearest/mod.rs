@@ -7,10 +7,11 @@ mod identity;
 
 use nalgebra::Vector2;
 
-use super::{Class, Object, Rectangle, TrackParameters};
+use super::{Class, Object, TrackParameters};
 use crate::cloud::Scan;
 use crate::cluster::Clusters;
 use crate::ego::{Sweep, wrapped_rad};
+use crate::geometry::Rectangle;
 use crate::ground::Plane;
 use crate::time::Time;
 use ctrv::Filter;

@@ -10,6 +10,7 @@ mod rest;
 
 mod reunion;
 
+use super::TrackParameters;
 use super::belief::Belief;
 use super::existence::Existence;
 use super::look::Look;
@@ -19,7 +20,7 @@ use super::sight::Sight;
 use super::spots::Spot;
 use super::trail::Trails;
 use super::view::View;
-use super::{Rectangle, TrackParameters};
+use crate::geometry::Rectangle;
 use crate::time::{Span, Time};
 use reunion::Parting;
 
@@ -220,6 +221,12 @@ impl Track {
     /// Whether it is a vehicle that was seen to drive.
     pub(super) fn is_moving_vehicle(&self) -> bool {
         self.moves && self.shape.front_known && self.is_vehicle()
+    }
+
+    /// Whether it was seen to move, and does.
+    pub(super) fn is_surely_moving(&self) -> bool {
+        const LEAST_MPS: f64 = 0.5;
+        self.moves && self.velocity_mps().norm() > LEAST_MPS
     }
 
     /// Whether it may turn out to be a piece of something.

@@ -233,14 +233,14 @@ fn closeness(points_m: &[[f32; 2]], [sine, cosine]: &Directions) -> [f32; TOGETH
 
 /// Least and greatest coordinates along and across a direction.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Extent {
-    pub(super) low: [f64; 2],
-    pub(super) high: [f64; 2],
+pub(crate) struct Extent {
+    pub(crate) low: [f64; 2],
+    pub(crate) high: [f64; 2],
 }
 
 impl Extent {
     #[inline]
-    pub(super) fn of(points_m: impl Iterator<Item = [f64; 2]>, sine: f64, cosine: f64) -> Self {
+    pub(crate) fn of(points_m: impl Iterator<Item = [f64; 2]>, sine: f64, cosine: f64) -> Self {
         let nothing = Self {
             low: [f64::MAX; 2],
             high: [f64::MIN; 2],
@@ -261,7 +261,7 @@ impl Extent {
 
 /// A point's coordinates along and across a direction.
 #[inline(always)]
-pub(super) fn turned<T>([x, y]: &[T; 2], sine: T, cosine: T) -> [T; 2]
+pub(crate) fn turned<T>([x, y]: &[T; 2], sine: T, cosine: T) -> [T; 2]
 where
     T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>,
 {

@@ -1,0 +1,9 @@
+//! What more than one stage measures with: boxes from above, places and directions in space.
+
+mod rectangle;
+mod rigid;
+
+pub(crate) use rectangle::{Extent, turned};
+pub use rectangle::{Outline, Rectangle};
+pub use rigid::Rigid;
+pub(crate) use rigid::{angular, linear, turn};

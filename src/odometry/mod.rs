@@ -1,0 +1,513 @@
+//! How the sensor moves, from what it sees: each revolution is aligned with a small map of what stands.
+//!
+//! `features` picks returns on smooth surfaces, `surface_map` keeps the surfaces, `registration` finds the pose from
+//! which the one lies on the other, `motion` knows where that must be about, and `rigid` is the geometry.
+//! This file takes a revolution through them, in the manner of KISS-ICP (Vizzo et al. 2023).
+
+mod cells;
+mod features;
+mod motion;
+mod poles;
+mod registration;
+mod surfaces;
+mod uprights;
+
+use nalgebra::{Vector3, Vector6};
+
+use crate::cloud::Scan;
+use crate::geometry::{self, Rigid};
+use crate::time::{Span, Time};
+use features::Feature;
+use motion::Motion;
+use registration::{Agreement, Alignment, Links, Map, View};
+
+/// The odometry step.
+#[derive(Debug, Clone)]
+pub struct Odometry {
+    motion: Motion,
+    /// The middle of the last sweep: what the motion holds at.
+    time: Option<Time>,
+    /// Since the sweep before, and where the sensor was then.
+    passed_s: f64,
+    from_m: Vector3<f64>,
+    /// The velocity with which the view was moved to the middle of the sweep.
+    skew_velocity: Vector6<f64>,
+    map: Map,
+    /// As the sensor met them, and as seen from the middle of the sweep.
+    met: View,
+    view: View,
+    links: Links,
+    /// Motions that are looked for, and how well each fits.
+    found: Vec<(f64, Vector6<f64>)>,
+    state: State,
+    /// Whether the frame began at a velocity that was known.
+    is_led: bool,
+    epoch: u32,
+    /// One in so many columns is looked at.
+    every: usize,
+    usual_off_m: f64,
+    /// How well what is upright usually fits.
+    usual_agreement: Agreement,
+    report: OdometryReport,
+}
+
+/// How much is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// Nothing: the next revolution begins the map.
+    New,
+    /// One revolution, and no velocity.
+    Begun,
+    /// The motion is followed.
+    Following,
+    /// So many revolutions in a row did not fit.
+    Lost(u32),
+}
+
+/// What became of a revolution.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct OdometryReport {
+    /// Features that were aligned.
+    pub features: usize,
+    /// Those with a surface of the map near them.
+    pub met: usize,
+    /// Those that lie on it.
+    pub fitting: usize,
+    /// Root mean square of how far these lie off it.
+    pub off_m: f64,
+    /// Standard deviation of the place that the revolution alone gives, in the direction along the ground in which it
+    /// tells least.
+    pub deviation_m: f64,
+    /// How the motion is followed.
+    pub quality: Quality,
+}
+
+/// How the motion is followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Quality {
+    /// Not from what is seen.
+    #[default]
+    Off,
+    /// A map has begun, and no motion is known yet.
+    Begun,
+    /// By what is seen.
+    Following,
+    /// What is seen does not tell all of it: a plain, a tunnel. Prediction and poses tell the rest.
+    Degenerate,
+    /// What is seen does not fit: prediction and poses alone.
+    Lost,
+}
+
+impl Quality {
+    /// How Status names it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Off => "off",
+            Self::Begun => "begun",
+            Self::Following => "following",
+            Self::Degenerate => "degenerate",
+            Self::Lost => "lost",
+        }
+    }
+}
+
+/// What may have become of a revolution.
+#[derive(Debug, Clone, Copy)]
+struct Attempt {
+    motion: Motion,
+    alignment: Alignment,
+}
+
+/// How far features lie off at first, and the share of a revolution in how far they usually do.
+const FIRST_OFF_M: f64 = 0.05;
+const FRESH: f64 = 0.1;
+/// Deviation of the place from which on what is seen does not tell it.
+const MOST_DEVIATION_M: f64 = 0.1;
+/// One in so many columns is looked at first.
+const FIRST_EVERY: usize = 8;
+/// Fewer features say nothing.
+const FEWEST: usize = 40;
+/// Share of them that must have a surface near them, and of these that must lie on it.
+const LEAST_MET: f64 = 0.25;
+const LEAST_FITTING: f64 = 0.5;
+/// Share of the usual agreement below which the sensor was jerked.
+const LEAST_AGREEMENT: f64 = 0.5;
+/// Revolutions in a row that may be lost before another map begins.
+const PATIENCE: u32 = 5;
+/// How often a revolution is aligned anew because it was skewed otherwise than thought.
+const MOST_TURNS: usize = 3;
+/// How surprising a pose may be before the prediction is trusted less.
+const MOST_SURPRISE: f64 = 2.0;
+/// How much better than the prediction another motion must fit, and where there is hardly a prediction.
+const CLEARLY: f64 = 1.25;
+const SLIGHTLY: f64 = 1.05;
+
+impl Default for Odometry {
+    fn default() -> Self {
+        Self {
+            motion: Motion::begin(Rigid::IDENTITY, None),
+            time: None,
+            passed_s: 0.0,
+            from_m: Vector3::zeros(),
+            skew_velocity: Vector6::zeros(),
+            map: Map::new(),
+            met: View::default(),
+            view: View::default(),
+            links: Links::default(),
+            found: Vec::with_capacity(128),
+            state: State::New,
+            is_led: false,
+            epoch: 0,
+            every: FIRST_EVERY,
+            usual_off_m: FIRST_OFF_M,
+            usual_agreement: Agreement::default(),
+            report: OdometryReport::default(),
+        }
+    }
+}
+
+impl Odometry {
+    /// Begins a new frame, in which the sensor is at `pose` in the middle of the next sweep, and at a velocity (metres and
+    /// radians a second, in that frame) if that is known.
+    pub fn begin(&mut self, pose: &Rigid, velocity: Option<Vector6<f64>>) {
+        self.motion = Motion::begin(*pose, velocity);
+        self.is_led = velocity.is_some();
+        self.time = None;
+        self.map.clear();
+        self.state = State::New;
+        (self.usual_off_m, self.usual_agreement) = (FIRST_OFF_M, Agreement::default());
+    }
+
+    /// Whether the next scan begins a frame.
+    pub fn begins(&self) -> bool {
+        self.state == State::New
+    }
+
+    /// Counts how often a frame began because the sensor was lost.
+    pub fn epoch(&self) -> u32 {
+        self.epoch
+    }
+
+    /// Goes on to the middle of a scan, for [`Odometry::guide`] and [`Odometry::process`].
+    pub fn predict(&mut self, scan: &Scan) {
+        let middle = scan.time() + Span::from_seconds(-0.5 * scan.duration_s());
+        self.passed_s = self.time.map_or(0.0, |last| (middle - last).seconds());
+        self.time = Some(middle);
+        self.from_m = self.motion.pose.translation_m;
+        self.motion.predict(self.passed_s);
+    }
+
+    /// Takes in where something else says that the sensor is in the plane.
+    pub fn guide(&mut self, pose: &Rigid, deviation_m: f64, deviation_rad: f64) {
+        let still = Vector6::zeros();
+        for (axis, deviation) in [(0, deviation_m), (1, deviation_m), (5, deviation_rad)] {
+            let mut row = Vector6::zeros();
+            row[axis] = 1.0;
+            let off = self.motion.pose.step_to(pose)[axis];
+            self.motion
+                .measure([&row, &still], off, deviation * deviation);
+        }
+    }
+
+    /// Takes in how fast something else says that the sensor goes in a direction along the ground.
+    pub fn guide_speed(&mut self, ahead_rad: f64, speed_mps: f64, deviation_mps: f64) {
+        let (sine, cosine) = libm::sincos(ahead_rad);
+        let ahead = Vector6::new(cosine, sine, 0.0, 0.0, 0.0, 0.0);
+        let off = speed_mps - self.motion.velocity.dot(&ahead);
+        let still = Vector6::zeros();
+        self.motion
+            .measure([&still, &ahead], off, deviation_mps * deviation_mps);
+    }
+
+    /// Takes in how fast something else says that it turns, counter-clockwise.
+    pub fn guide_yaw_rate(&mut self, rate_radps: f64, deviation_radps: f64) {
+        let mut turning = Vector6::zeros();
+        turning[5] = 1.0;
+        let off = rate_radps - self.motion.velocity[5];
+        let still = Vector6::zeros();
+        self.motion
+            .measure([&still, &turning], off, deviation_radps * deviation_radps);
+    }
+
+    /// How fast the sensor goes in a direction along the ground.
+    pub fn speed_mps(&self, ahead_rad: f64) -> f64 {
+        let (sine, cosine) = libm::sincos(ahead_rad);
+        self.motion.velocity[0] * cosine + self.motion.velocity[1] * sine
+    }
+
+    /// How fast it turns, counter-clockwise.
+    pub fn yaw_rate_radps(&self) -> f64 {
+        self.motion.velocity[5]
+    }
+
+    /// Where the sensor is thought to be in the middle of the last sweep, or of the one that is predicted.
+    pub fn pose(&self) -> Rigid {
+        self.motion.pose
+    }
+
+    /// Where the sensor is expected to be at the end of a scan.
+    pub fn expected(&self, scan: &Scan) -> Rigid {
+        let seconds = self.time.map_or(0.0, |last| (scan.time() - last).seconds());
+        self.motion.pose.moved(&(self.motion.velocity * seconds))
+    }
+
+    /// Takes a scan in. `is_used` says of a column and a point whether what it met stands.
+    pub fn process(&mut self, scan: &Scan, is_used: impl Fn(usize, [f32; 3]) -> bool) {
+        features::gather(
+            scan,
+            self.every,
+            &is_used,
+            &mut self.met.surfaces,
+            &mut self.met.foliage,
+        );
+        poles::gather(scan, &is_used, &mut self.met.poles);
+        self.thin();
+        self.report = OdometryReport::default();
+        if self.state == State::New {
+            self.unskew(&self.motion.clone());
+            self.map.add(&self.view, &self.motion.pose);
+            self.state = State::Begun;
+            self.report.quality = Quality::Begun;
+            return;
+        }
+        let predicted = self.motion;
+        let mut attempt = self.attempt(predicted);
+        if self.state == State::Begun || !self.is_usual(&attempt) {
+            attempt = self.search(predicted, attempt);
+        }
+        self.take(scan, &attempt);
+    }
+
+    /// Looks at more columns in the next revolution where little is seen, and at less where much is.
+    fn thin(&mut self) {
+        const ENOUGH: std::ops::Range<usize> = 300..450;
+        const MOST_EVERY: usize = 14;
+        const LEAST_EVERY: usize = 4;
+        let found = self.met.surfaces.len() + self.met.foliage.len() / 2;
+        if found < ENOUGH.start {
+            self.every = (self.every - 1).max(LEAST_EVERY);
+        } else if found > ENOUGH.end {
+            self.every = (self.every + 1).min(MOST_EVERY);
+        }
+    }
+
+    /// Aligns the revolution from a prediction.
+    fn attempt(&mut self, mut predicted: Motion) -> Attempt {
+        self.unskew(&predicted);
+        let mut start = predicted.pose;
+        let mut turns = 0;
+        loop {
+            let mut alignment = self.align(&predicted, &start);
+            let surprise = predicted.surprise(&alignment.pose);
+            if surprise > MOST_SURPRISE {
+                predicted.loosen(surprise);
+                alignment = self.align(&predicted, &alignment.pose);
+            }
+            let motion = predicted.corrected(alignment.pose, &alignment.information);
+            turns += 1;
+            if turns == MOST_TURNS || !motion.skews_otherwise(&self.skew_velocity) {
+                return Attempt { motion, alignment };
+            }
+            start = alignment.pose;
+            self.unskew(&motion);
+        }
+    }
+
+    fn align(&mut self, predicted: &Motion, start: &Rigid) -> Alignment {
+        registration::align(
+            &self.map,
+            &self.view,
+            predicted,
+            start,
+            self.usual_off_m,
+            &mut self.links,
+        )
+    }
+
+    /// Whether what is upright fits as well as usual, if there is any.
+    fn is_usual(&self, attempt: &Attempt) -> bool {
+        // Something large that moves takes its share, what is new takes its sum.
+        attempt.alignment.agreement.is_none_or(|agreement| {
+            agreement.share >= LEAST_AGREEMENT * self.usual_agreement.share
+                || agreement.sum >= LEAST_AGREEMENT * self.usual_agreement.sum
+        })
+    }
+
+    /// Looks around a prediction for the motion with which the revolution fits the map best: at the second revolution, of
+    /// which no motion is known, and where the sensor was jerked.
+    fn search(&mut self, predicted: Motion, first: Attempt) -> Attempt {
+        const LEAST_PASSED_S: f64 = 0.01;
+        /// One in so many features is asked, and so many motions are tried.
+        const SEARCH_EVERY: usize = 4;
+        const TRIED: usize = 4;
+        if self.passed_s < LEAST_PASSED_S {
+            return first;
+        }
+        self.unskew(&predicted);
+        let begins = self.state == State::Begun;
+        let ahead = |direction_rad: f64| {
+            let (sine, cosine) = libm::sincos(direction_rad);
+            predicted.pose.rotation * Vector3::new(sine, cosine, 0.0)
+        };
+        let up = predicted.pose.rotation * Vector3::z();
+        let mut found = std::mem::take(&mut self.found);
+        found.clear();
+        let mut offer = |shift: Vector3<f64>, turn: Vector3<f64>| {
+            let by = Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z);
+            let score = registration::agreement(
+                &self.map,
+                &self.view,
+                &predicted.pose,
+                &by,
+                self.passed_s,
+                SEARCH_EVERY,
+            );
+            found.extend(score.map(|score| (score.share, by)));
+        };
+        if begins {
+            for way in 1..=8 {
+                for direction in 0..8 {
+                    let shift = ahead(f64::from(direction) * std::f64::consts::FRAC_PI_4);
+                    offer(shift * (0.5 * f64::from(way)), Vector3::zeros());
+                }
+            }
+        } else {
+            for turn in -10..=10 {
+                for way in -2..=2 {
+                    let shift = ahead(0.0) * (0.4 * f64::from(way));
+                    offer(shift, up * (0.02 * f64::from(turn)));
+                }
+            }
+        }
+        found.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+        let mut tried = [Vector6::zeros(); TRIED];
+        let mut count = 0;
+        let mut best = first;
+        for (_, by) in &found {
+            let is_near = |other: &Vector6<f64>| {
+                let off = by - other;
+                geometry::linear(&off).norm_squared() < 0.6 * 0.6
+                    && geometry::angular(&off).norm_squared() < 0.05 * 0.05
+            };
+            if tried[..count].iter().any(is_near) {
+                continue;
+            }
+            tried[count] = *by;
+            count += 1;
+            let mut jerked = predicted;
+            jerked.jerk(by, self.passed_s);
+            let attempt = self.attempt(jerked);
+            let better = if begins { SLIGHTLY } else { CLEARLY };
+            let share = |attempt: &Attempt| attempt.alignment.agreement.map(|found| found.share);
+            let is_better = share(&attempt) > share(&best).map(|least| better * least);
+            if is_better && (begins || self.is_usual(&attempt)) {
+                best = attempt;
+            }
+            if count == TRIED {
+                break;
+            }
+        }
+        self.found = found;
+        self.unskew(&best.motion);
+        best
+    }
+
+    /// Makes an attempt the motion, and takes the revolution into the map if it fits.
+    fn take(&mut self, scan: &Scan, attempt: &Attempt) {
+        let alignment = &attempt.alignment;
+        self.report = OdometryReport {
+            features: self.view.surfaces.len(),
+            met: alignment.met,
+            fitting: alignment.fitting,
+            off_m: alignment.off_m,
+            deviation_m: alignment.deviation_m,
+            quality: if alignment.deviation_m < MOST_DEVIATION_M {
+                Quality::Following
+            } else {
+                Quality::Degenerate
+            },
+        };
+        let fits = self.fits(alignment);
+        if fits {
+            self.motion = attempt.motion;
+            let way_m = self.motion.pose.translation_m - self.from_m;
+            self.map.advance(libm::sqrt(way_m.norm_squared()));
+        }
+        if !fits || !self.is_usual(attempt) {
+            self.lose();
+            return;
+        }
+        self.usual_off_m += FRESH * (alignment.off_m - self.usual_off_m);
+        if let Some(agreement) = attempt.alignment.agreement {
+            let usual = &mut self.usual_agreement;
+            usual.share += FRESH * (agreement.share - usual.share);
+            usual.sum += FRESH * (agreement.sum - usual.sum);
+        }
+        if self.state == State::Begun && !self.is_led {
+            // The first sweep was taken for one from a standing sensor: it ended farther on.
+            let early_s = -0.5 * scan.duration_s();
+            self.motion.pose = self.motion.pose.moved(&(self.motion.velocity * early_s));
+            self.map.clear();
+        }
+        self.state = State::Following;
+        self.map.add(&self.view, &self.motion.pose);
+    }
+
+    /// Counts a revolution that does not fit the map, and begins another map when there were too many.
+    fn lose(&mut self) {
+        let times = match self.state {
+            State::Lost(times) => times + 1,
+            _ => 1,
+        };
+        self.state = State::Lost(times);
+        self.report.quality = Quality::Lost;
+        if times > PATIENCE {
+            self.map.clear();
+            self.motion = Motion::begin(self.motion.pose, None);
+            self.is_led = false;
+            (self.usual_off_m, self.usual_agreement) = (FIRST_OFF_M, Agreement::default());
+            self.epoch = self.epoch.wrapping_add(1);
+            self.state = State::New;
+        }
+    }
+
+    fn fits(&self, alignment: &Alignment) -> bool {
+        let share = |part: usize, of: usize| part as f64 / of.max(1) as f64;
+        self.view.surfaces.len() >= FEWEST
+            && share(alignment.met, self.view.surfaces.len()) >= LEAST_MET
+            && share(alignment.fitting, alignment.met) >= LEAST_FITTING
+    }
+
+    /// Moves the features to where the sensor would have met them from the middle of the sweep.
+    fn unskew(&mut self, motion: &Motion) {
+        self.skew_velocity = motion.velocity;
+        let back = motion.pose.rotation.transpose();
+        let velocity = back * geometry::linear(&motion.velocity);
+        let rate = back * geometry::angular(&motion.velocity);
+        let moved = |feature: &Feature| {
+            // Turns during half a sweep are small: two terms of the series leave less than 1e-4.
+            let axis = rate * feature.late_s;
+            let turned = |v: &Vector3<f64>| {
+                let first = axis.cross(v);
+                v + first + 0.5 * axis.cross(&first)
+            };
+            Feature {
+                point_m: turned(&feature.point_m) + velocity * feature.late_s,
+                normal: turned(&feature.normal),
+                ..*feature
+            }
+        };
+        self.met.put(&mut self.view, moved);
+    }
+
+    /// Where the sensor was, seconds after the end of the last sweep or, negative, before.
+    pub fn pose_at(&self, scan: &Scan, after_end_s: f64) -> Rigid {
+        let seconds = after_end_s + 0.5 * scan.duration_s();
+        self.motion.pose.moved(&(self.motion.velocity * seconds))
+    }
+
+    /// What became of the last revolution.
+    pub fn report(&self) -> &OdometryReport {
+        &self.report
+    }
+}
