@@ -50,12 +50,20 @@ def within(boxes, x, y, margin):
     return inside
 
 
-def static_scores(grid_path, true_path, truth):
+def frames_apart(trajectory, truth):
+    """How far the frame of a map lies from that of the truth, along the vehicle's way: without poses it begins
+    elsewhere, and drifts."""
+    found = np.loadtxt(trajectory)[:, 1:3]
+    true = np.array([[line["ego"]["x"], line["ego"]["y"]] for line in truth[: len(found)]])
+    return np.mean(true - found, axis=0)
+
+
+def static_scores(grid_path, true_path, truth, apart):
     """Recall, precision and free space in percent within 10 and 50 m of the vehicle's path."""
     with np.load(grid_path) as grid, np.load(true_path) as true:
         cell = float(grid["cell"])
         found, bits, origin = grid["probability"], true["cells"], true["origin"]
-        shift = np.round((grid["origin"] - origin) / cell).astype(int)
+        shift = np.round((grid["origin"] + apart - origin) / cell).astype(int)
     low = np.maximum(shift, 0)
     high = np.minimum(bits.shape[::-1], shift + found.shape[::-1])
     found = found[low[1] - shift[1] : high[1] - shift[1], low[0] - shift[0] : high[0] - shift[0]]
@@ -149,17 +157,19 @@ def stream_scores(recording, truth, true_path):
     }
 
 
-def scores(run, folder, scenario, seed, duration, config):
+def scores(run, folder, scenario, seed, duration, config, without_poses):
     """All scores of one scenario and seed."""
     stem = folder / f"map-{scenario}-{seed}"
     rec, truth, true = (stem.with_suffix(s) for s in [".rec", ".truth.jsonl", ".true.npz"])
     out, grid = stem.with_suffix(".out.rec"), stem.with_suffix(".npz")
     simulated = ["simulate", scenario, "--seed", seed, "--duration", duration]
     run(*simulated, "--output", rec, "--truth", truth, "--grid", true)
-    run("process", rec, "--output", out, "--grid", grid, "--config", config)
+    way = stem.with_suffix(".tum")
+    run("process", rec, "--output", out, "--grid", grid, "--trajectory", way, "--config", config)
     with open(truth) as file:
         lines = [json.loads(line) for line in file]
-    result = static_scores(grid, true, lines) | stream_scores(out, lines, true)
+    apart = frames_apart(way, lines) if without_poses else np.zeros(2)
+    result = static_scores(grid, true, lines, apart) | stream_scores(out, lines, true)
     for path in [rec, out]:
         path.unlink()
     return result
