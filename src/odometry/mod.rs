@@ -1,14 +1,17 @@
 //! How the sensor moves, from what it sees: each revolution is aligned with a small map of what stands.
 //!
-//! `features` picks returns on smooth surfaces, `surface_map` keeps the surfaces, `registration` finds the pose from
-//! which the one lies on the other, `motion` knows where that must be about, and `rigid` is the geometry.
+//! `features` and `poles` pick returns that tell something, `map` keeps what stands: `surfaces` and `uprights` in
+//! `cells`. `registration` finds the pose from which the one lies on the other, `motion` knows where that must be
+//! about, and `search` looks farther where the sensor was jerked.
 //! This file takes a revolution through them, in the manner of KISS-ICP (Vizzo et al. 2023).
 
 mod cells;
 mod features;
+mod map;
 mod motion;
 mod poles;
 mod registration;
+mod search;
 mod surfaces;
 mod uprights;
 
@@ -18,8 +21,9 @@ use crate::cloud::Scan;
 use crate::geometry::{self, Rigid};
 use crate::time::{Span, Time};
 use features::Feature;
+use map::{Map, View};
 use motion::Motion;
-use registration::{Agreement, Alignment, Links, Map, View};
+use registration::{Agreement, Alignment, Links};
 
 /// The odometry step.
 #[derive(Debug, Clone)]
@@ -138,10 +142,6 @@ const PATIENCE: u32 = 5;
 const MOST_TURNS: usize = 3;
 /// How surprising a pose may be before the prediction is trusted less.
 const MOST_SURPRISE: f64 = 2.0;
-/// How much better than the prediction another motion must fit, and where there is hardly a prediction.
-const CLEARLY: f64 = 1.25;
-const SLIGHTLY: f64 = 1.05;
-
 impl Default for Odometry {
     fn default() -> Self {
         Self {
@@ -331,85 +331,6 @@ impl Odometry {
             agreement.share >= LEAST_AGREEMENT * self.usual_agreement.share
                 || agreement.sum >= LEAST_AGREEMENT * self.usual_agreement.sum
         })
-    }
-
-    /// Looks around a prediction for the motion with which the revolution fits the map best: at the second revolution, of
-    /// which no motion is known, and where the sensor was jerked.
-    fn search(&mut self, predicted: Motion, first: Attempt) -> Attempt {
-        const LEAST_PASSED_S: f64 = 0.01;
-        /// One in so many features is asked, and so many motions are tried.
-        const SEARCH_EVERY: usize = 4;
-        const TRIED: usize = 4;
-        if self.passed_s < LEAST_PASSED_S {
-            return first;
-        }
-        self.unskew(&predicted);
-        let begins = self.state == State::Begun;
-        let ahead = |direction_rad: f64| {
-            let (sine, cosine) = libm::sincos(direction_rad);
-            predicted.pose.rotation * Vector3::new(sine, cosine, 0.0)
-        };
-        let up = predicted.pose.rotation * Vector3::z();
-        let mut found = std::mem::take(&mut self.found);
-        found.clear();
-        let mut offer = |shift: Vector3<f64>, turn: Vector3<f64>| {
-            let by = Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z);
-            let score = registration::agreement(
-                &self.map,
-                &self.view,
-                &predicted.pose,
-                &by,
-                self.passed_s,
-                SEARCH_EVERY,
-            );
-            found.extend(score.map(|score| (score.share, by)));
-        };
-        if begins {
-            for way in 1..=8 {
-                for direction in 0..8 {
-                    let shift = ahead(f64::from(direction) * std::f64::consts::FRAC_PI_4);
-                    offer(shift * (0.5 * f64::from(way)), Vector3::zeros());
-                }
-            }
-        } else {
-            for turn in -10..=10 {
-                for way in -2..=2 {
-                    let shift = ahead(0.0) * (0.4 * f64::from(way));
-                    offer(shift, up * (0.02 * f64::from(turn)));
-                }
-            }
-        }
-        found.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
-        let mut tried = [Vector6::zeros(); TRIED];
-        let mut count = 0;
-        let mut best = first;
-        for (_, by) in &found {
-            let is_near = |other: &Vector6<f64>| {
-                let off = by - other;
-                geometry::linear(&off).norm_squared() < 0.6 * 0.6
-                    && geometry::angular(&off).norm_squared() < 0.05 * 0.05
-            };
-            if tried[..count].iter().any(is_near) {
-                continue;
-            }
-            tried[count] = *by;
-            count += 1;
-            let mut jerked = predicted;
-            jerked.jerk(by, self.passed_s);
-            let attempt = self.attempt(jerked);
-            let better = if begins { SLIGHTLY } else { CLEARLY };
-            let share = |attempt: &Attempt| attempt.alignment.agreement.map(|found| found.share);
-            let is_better = share(&attempt) > share(&best).map(|least| better * least);
-            if is_better && (begins || self.is_usual(&attempt)) {
-                best = attempt;
-            }
-            if count == TRIED {
-                break;
-            }
-        }
-        self.found = found;
-        self.unskew(&best.motion);
-        best
     }
 
     /// Makes an attempt the motion, and takes the revolution into the map if it fits.
