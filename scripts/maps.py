@@ -17,6 +17,8 @@ OCCUPIED, SEEN, PASSED = 1, 2, 4
 MOVING_MPS = 0.5
 LATE_JOIN_S = 10
 REACH_M = 50
+# A shorter way does not tell how a frame is turned.
+LEAST_WAY_M = 5
 
 
 def unzigzag(value):
@@ -50,24 +52,44 @@ def within(boxes, x, y, margin):
     return inside
 
 
-def frames_apart(trajectory, truth):
-    """How far the frame of a map lies from that of the truth, along the vehicle's way: without poses it begins
-    elsewhere, and drifts."""
-    found = np.loadtxt(trajectory)[:, 1:3]
-    true = np.array([[line["ego"]["x"], line["ego"]["y"]] for line in truth[: len(found)]])
-    return np.mean(true - found, axis=0)
+class Apart:
+    """How the frame of a map is turned and moved against that of the truth."""
+
+    def __init__(self, turn=0.0, shift=(0.0, 0.0)):
+        self.turn, self.shift = turn, np.array(shift)
+
+    @classmethod
+    def along(cls, trajectory, truth):
+        """From the vehicle's way in both (Umeyama 1991): without poses the frame begins elsewhere, and drifts."""
+        found = np.loadtxt(trajectory)[:, 1:3]
+        true = np.array([[line["ego"]["x"], line["ego"]["y"]] for line in truth[: len(found)]])
+        got, wanted = found - found.mean(0), true - true.mean(0)
+        turn = math.atan2(np.sum(got[:, 0] * wanted[:, 1] - got[:, 1] * wanted[:, 0]), np.sum(got * wanted))
+        if np.ptp(true, axis=0).max() < LEAST_WAY_M:
+            turn = 0.0
+        cosine, sine = math.cos(turn), math.sin(turn)
+        return cls(turn, true.mean(0) - np.array([[cosine, -sine], [sine, cosine]]) @ found.mean(0))
+
+    def on_cells(self, grid, shape, origin, cell):
+        """A map's probabilities on the cells of the truth, not a number outside of the map."""
+        found = grid["probability"]
+        row, column = np.indices(shape)
+        x = origin[0] + (column + 0.5) * cell - self.shift[0]
+        y = origin[1] + (row + 0.5) * cell - self.shift[1]
+        cosine, sine = math.cos(self.turn), math.sin(self.turn)
+        column = np.floor((cosine * x + sine * y - grid["origin"][0]) / cell).astype(int)
+        row = np.floor((cosine * y - sine * x - grid["origin"][1]) / cell).astype(int)
+        known = (0 <= row) & (row < found.shape[0]) & (0 <= column) & (column < found.shape[1])
+        result = np.full(shape, np.nan, found.dtype)
+        result[known] = found[row[known], column[known]]
+        return result
 
 
 def static_scores(grid_path, true_path, truth, apart):
     """Recall, precision and free space in percent within 10 and 50 m of the vehicle's path."""
     with np.load(grid_path) as grid, np.load(true_path) as true:
-        cell = float(grid["cell"])
-        found, bits, origin = grid["probability"], true["cells"], true["origin"]
-        shift = np.round((grid["origin"] + apart - origin) / cell).astype(int)
-    low = np.maximum(shift, 0)
-    high = np.minimum(bits.shape[::-1], shift + found.shape[::-1])
-    found = found[low[1] - shift[1] : high[1] - shift[1], low[0] - shift[0] : high[0] - shift[0]]
-    bits, origin = bits[low[1] : high[1], low[0] : high[0]], origin + low * cell
+        cell, bits, origin = float(grid["cell"]), true["cells"], true["origin"]
+        found = apart.on_cells(grid, bits.shape, origin, cell)
     off_path = np.ones(found.shape, bool)
     for line in truth:
         column, row = (int((line["ego"][axis] - origin[n]) / cell) for n, axis in enumerate("xy"))
@@ -79,7 +101,7 @@ def static_scores(grid_path, true_path, truth, apart):
     near_standing = tolerant(stands)
     scores = {}
     for reach in [10, 50]:
-        near = distance <= reach
+        near = (distance <= reach) & np.isfinite(found)
         wanted, got = stands & (bits & SEEN > 0) & near, occupied & near
         free = (bits & PASSED > 0) & ~near_standing & near
         scores[f"occupied cells found within {reach} m, %"] = 100 * np.mean(tolerant(occupied)[wanted])
@@ -168,7 +190,7 @@ def scores(run, folder, scenario, seed, duration, config, without_poses):
     run("process", rec, "--output", out, "--grid", grid, "--trajectory", way, "--config", config)
     with open(truth) as file:
         lines = [json.loads(line) for line in file]
-    apart = frames_apart(way, lines) if without_poses else np.zeros(2)
+    apart = Apart.along(way, lines) if without_poses else Apart()
     result = static_scores(grid, true, lines, apart) | stream_scores(out, lines, true)
     for path in [rec, out]:
         path.unlink()
