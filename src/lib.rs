@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! datagram -> wire -> cloud -> odometry -> ego -> ground -> cluster -> track -> wire -> datagram
-//!                |                        /  \ \______________________\-> grid -/
+//!                |                        /  \ \___ beams ___________/ \-> grid -/
 //!                \-> poses --------------/    \-------------------------/
 //! ```
 //!
@@ -31,6 +31,9 @@ pub mod ego;
 
 // Which points are ground.
 pub mod ground;
+
+// What rays say of a place: seen empty, seen occupied, not seen.
+pub mod beams;
 
 // Which of the others belong together.
 pub mod cluster;

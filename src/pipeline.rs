@@ -1,5 +1,6 @@
 //! All the steps, in order. This is the one place that names them all.
 
+use crate::beams::Beams;
 use crate::cloud::{Dialect, Extent, Intake, OwnVehicle, Revolution, Scan};
 use crate::cluster::Dbscan;
 use crate::config::Configuration;
@@ -46,6 +47,7 @@ pub struct Pipeline {
     /// How the points of each column of the last revolution are placed.
     placements: Vec<Placement>,
     ground: Ground,
+    beams: Beams,
     clusters: Dbscan,
     tracker: Tracker,
     /// The last revolution's objects in the local frame.
@@ -132,6 +134,7 @@ impl Pipeline {
             sweep: Sweep::still(0),
             placements: vec![],
             ground: Ground::new(&configuration.ground),
+            beams: Beams::default(),
             clusters: Dbscan::new(&configuration.cluster),
             tracker: Tracker::new(&configuration.track),
             objects: vec![],
@@ -221,6 +224,7 @@ impl Pipeline {
         if revolution.time_jumped {
             self.ego.reset();
             self.ground.reset();
+            self.beams.reset();
             self.tracker.reset();
             self.grid.reset();
         }
@@ -246,17 +250,23 @@ impl Pipeline {
         let (mask, heights_m) = (self.ground.mask(), self.ground.heights_m());
         let clusters = self.clusters.process(&self.scan, mask, heights_m);
         done(Step::Cluster);
+        self.beams.begin(&sweep);
         let scene = Scene {
             scan: &self.scan,
             heights_m: self.ground.heights_m(),
             ground: &ground,
             sweep: &sweep,
             placements: &self.placements,
+            beams: &self.beams,
         };
         let objects = self.tracker.process(clusters, &scene);
         self.objects.clear();
         let in_local_frame = |object: &Object| object.in_local_frame(&sweep.anchor);
         self.objects.extend(objects.iter().map(in_local_frame));
+        let moving = self.tracker.expect_moving(revolution.time, &sweep);
+        let ground_mask = self.ground.mask();
+        self.beams
+            .remember(&self.scan, ground_mask, moving, &sweep, &self.placements);
         done(Step::Track);
 
         let report = RevolutionReport {

@@ -26,7 +26,7 @@ pub use dialect::{ByteOrderSource, Dialect, shown_order};
 pub use intake::{Intake, Revolution};
 pub use own_vehicle::{Extent, OwnVehicle};
 pub use refusal::Refusal;
-pub use scan::{CAPACITY, MAX_COLUMNS, MAX_LAYERS, Scan};
+pub use scan::{Azimuths, CAPACITY, MAX_COLUMNS, MAX_LAYERS, Scan};
 
 use crate::parameter::{choices, parameters};
 

@@ -44,6 +44,39 @@ pub struct Scan {
     z_m: Box<[f32]>,
 }
 
+/// Where the columns of a scan look.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Azimuths {
+    columns: usize,
+    start_rad: f64,
+    step_rad: f64,
+    sees_all_round: bool,
+}
+
+impl Azimuths {
+    /// How many there are.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// The column nearest to an azimuth, in radians clockwise from y.
+    pub fn column_at(&self, azimuth_rad: f64) -> usize {
+        let turn_rad = azimuth_rad - self.start_rad;
+        let turn_rad = turn_rad - TAU * libm::floor(turn_rad / TAU);
+        let beyond_rad = turn_rad - self.columns as f64 * libm::fabs(self.step_rad);
+        if !self.sees_all_round && beyond_rad > 0.5 * (TAU - turn_rad + beyond_rad) {
+            return 0;
+        }
+        let column = libm::round(turn_rad / libm::fabs(self.step_rad).max(1e-9)) as usize;
+        let column = column.min(self.columns.saturating_sub(1));
+        if self.step_rad < 0.0 {
+            (self.columns - column) % self.columns.max(1)
+        } else {
+            column
+        }
+    }
+}
+
 impl Default for Scan {
     fn default() -> Self {
         let zeros = || vec![0.0; CAPACITY].into_boxed_slice();
@@ -210,18 +243,16 @@ impl Scan {
 
     /// The column nearest to an azimuth.
     pub fn column_at(&self, azimuth_rad: f64) -> usize {
-        let turn_rad = azimuth_rad - self.start_rad;
-        let turn_rad = turn_rad - TAU * libm::floor(turn_rad / TAU);
-        let beyond_rad = turn_rad - self.columns as f64 * libm::fabs(self.step_rad);
-        if !self.sensor.sees_all_round() && beyond_rad > 0.5 * (TAU - turn_rad + beyond_rad) {
-            return 0;
-        }
-        let column = libm::round(turn_rad / libm::fabs(self.step_rad).max(1e-9)) as usize;
-        let column = column.min(self.columns.saturating_sub(1));
-        if self.step_rad < 0.0 {
-            (self.columns - column) % self.columns.max(1)
-        } else {
-            column
+        self.azimuths().column_at(azimuth_rad)
+    }
+
+    /// Where its columns look.
+    pub fn azimuths(&self) -> Azimuths {
+        Azimuths {
+            columns: self.columns,
+            start_rad: self.start_rad,
+            step_rad: self.step_rad,
+            sees_all_round: self.sensor.sees_all_round(),
         }
     }
 

@@ -45,6 +45,8 @@ pub(super) struct Qualities {
     pub(super) speed_mps: f64,
     /// Whether it was seen to move.
     pub(super) moved: bool,
+    /// Whether it did so to where nothing was before.
+    pub(super) surely_moves: bool,
     /// Distance from the sensor.
     pub(super) range_m: f64,
     /// Returns on it.
@@ -181,6 +183,9 @@ const PROFILES: [Profile; 4] = [
     },
 ];
 
+/// What moves and looks like no class is a road user all the same; what stands and does so is none.
+const OTHER_LOG_PRIOR: f64 = -12.0;
+const OTHER_MOVED_LOG: f64 = -2.5;
 /// Structure is as frequent as everything else together, and does not move.
 const STRUCTURE_LOG_PRIOR: f64 = -0.9;
 const STRUCTURE_MOVED_LOG: f64 = -4.5;
@@ -201,6 +206,8 @@ const ROUGH_M: Within = Within(0.05, 1.0, 0.02);
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Belief {
     road_users: [f64; 4],
+    /// A road user of no class that is known: a person with a load, a pram, a horse.
+    other: f64,
     structure: f64,
 }
 
@@ -209,6 +216,7 @@ impl Belief {
     pub(super) fn unknown() -> Self {
         let mut belief = Self {
             road_users: PROFILES.map(|profile| libm::exp(profile.log_prior)),
+            other: libm::exp(OTHER_LOG_PRIOR),
             structure: libm::exp(STRUCTURE_LOG_PRIOR),
         };
         belief.normalise();
@@ -303,7 +311,7 @@ impl Belief {
                 + upright;
             libm::exp(log)
         });
-        let moved = if qualities.moved {
+        let moved = if qualities.moved || qualities.surely_moves {
             STRUCTURE_MOVED_LOG
         } else {
             0.0
@@ -316,8 +324,14 @@ impl Belief {
         let suspect = !qualities.moved && qualities.is_suspect;
         let moved = moved + few + if suspect { SUSPECT_LOG } else { 0.0 };
         let rough = 0.3 * ROUGH_M.log(qualities.roughness_m);
+        let other = if qualities.surely_moves {
+            OTHER_MOVED_LOG
+        } else {
+            OTHER_LOG_PRIOR
+        };
         let mut belief = Self {
             road_users,
+            other: libm::exp(other),
             structure: libm::exp(STRUCTURE_LOG_PRIOR + moved + rough.max(-0.5)),
         };
         belief.normalise();
@@ -325,10 +339,11 @@ impl Belief {
     }
 
     fn normalise(&mut self) {
-        let total = self.road_users.iter().sum::<f64>() + self.structure;
+        let total = self.road_users.iter().sum::<f64>() + self.other + self.structure;
         for probability in &mut self.road_users {
             *probability /= total;
         }
+        self.other /= total;
         self.structure /= total;
     }
 
@@ -337,6 +352,7 @@ impl Belief {
         for (probability, fresh) in self.road_users.iter_mut().zip(fresh.road_users) {
             *probability += share * (fresh - *probability);
         }
+        self.other += share * (fresh.other - self.other);
         self.structure += share * (fresh.structure - self.structure);
     }
 
@@ -412,6 +428,7 @@ mod tests {
         roughness_m: 0.02,
         speed_mps: 0.0,
         moved: false,
+        surely_moves: false,
         range_m: 15.0,
         points: 60,
         is_suspect: false,
@@ -428,6 +445,7 @@ mod tests {
             top_below_m: 1.9,
             speed_mps: 1.4,
             moved: true,
+            surely_moves: false,
             ..CAR
         };
         let rider = Qualities {
@@ -470,6 +488,7 @@ mod tests {
             across_m: Some(1.7),
             speed_mps: 14.0,
             moved: true,
+            surely_moves: false,
             points: 8,
             ..CAR
         };
@@ -493,6 +512,7 @@ mod tests {
             top_below_m: 4.1,
             speed_mps: 22.0,
             moved: true,
+            surely_moves: false,
             points: 9000,
             ..CAR
         };
@@ -516,12 +536,14 @@ mod tests {
             wide_m: Some(2.0),
             speed_mps: 4.0,
             moved: true,
+            surely_moves: false,
             points: 740,
             ..CAR
         };
         let wall = Qualities {
             speed_mps: 0.0,
             moved: false,
+            surely_moves: false,
             ..van
         };
         let [van, wall] = [van, wall].map(|qualities| Belief::of(&qualities));
@@ -539,6 +561,7 @@ mod tests {
             top_below_m: 2.1,
             speed_mps: 14.0,
             moved: true,
+            surely_moves: false,
             points: 15,
             ..CAR
         };
@@ -560,6 +583,7 @@ mod tests {
             top_below_m: 2.0,
             speed_mps: 1.4,
             moved: true,
+            surely_moves: false,
             points: 50,
             ..CAR
         };

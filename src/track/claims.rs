@@ -28,13 +28,14 @@ const STRUCTURE_MARGIN_M: f32 = 0.15;
 impl Claims {
     /// Gives every return of a patch to the nearest of the tracks `near` it that can have a return
     /// there; of equally near ones to the first. Less is theirs in structure than in what
-    /// `is_whole`, a road user from end to end.
+    /// `is_whole`, a road user from end to end; and what is new has little of what `is_old`.
     pub(super) fn settle(
         &mut self,
         placed: &[Placed],
         near: &[usize],
         forecasts: &Forecasts,
         is_whole: bool,
+        is_old: bool,
     ) {
         self.owners.clear();
         self.owners.resize(placed.len(), NOBODY);
@@ -50,7 +51,7 @@ impl Claims {
         }
         for track in near {
             let forecast = forecasts.of(*track);
-            let margin_m = if is_whole {
+            let margin_m = if is_whole && !(is_old && forecast.is_new) {
                 forecast.margin_m
             } else {
                 STRUCTURE_MARGIN_M
@@ -153,6 +154,8 @@ mod tests {
                 outline: place.outline(),
                 middle_m: [x as f32, 0.0],
                 margin_m: 1.2,
+                is_new: false,
+                from_m: Default::default(),
                 rests: false,
             }
         });
@@ -161,7 +164,7 @@ mod tests {
 
     fn owners(placed: &[Placed], is_whole: bool) -> (Vec<Option<usize>>, Option<(usize, f64)>) {
         let mut claims = Claims::default();
-        claims.settle(placed, &[0, 1], &forecasts(), is_whole);
+        claims.settle(placed, &[0, 1], &forecasts(), is_whole, false);
         (claims.owners().collect(), claims.only())
     }
 
@@ -177,9 +180,9 @@ mod tests {
     #[test]
     fn nothing_is_left_of_what_was_settled_before() {
         let mut claims = Claims::default();
-        claims.settle(&[0.0, 4.0, 4.5].map(at), &[0, 1], &forecasts(), true);
+        claims.settle(&[0.0, 4.0, 4.5].map(at), &[0, 1], &forecasts(), true, false);
         for near in [&[0, 1][..], &[0], &[]] {
-            claims.settle(&[-50.0, -60.0].map(at), near, &forecasts(), true);
+            claims.settle(&[-50.0, -60.0].map(at), near, &forecasts(), true, false);
             assert_eq!(claims.owners().collect::<Vec<_>>(), [None; 2]);
             assert_eq!(claims.only(), None);
         }
@@ -193,7 +196,7 @@ mod tests {
         );
         let mut claims = Claims::default();
         let placed = [0.0, 0.5, 4.0, 8.0].map(at);
-        claims.settle(&placed, &[0, 1], &forecasts(), true);
+        claims.settle(&placed, &[0, 1], &forecasts(), true, false);
         assert_eq!([0, 1, 2].map(|track| claims.share(track)), [0.5, 0.25, 0.0]);
         assert_eq!(owners(&[-5.0].map(at), true).1, None);
     }

@@ -6,6 +6,7 @@ use nalgebra::Vector2;
 
 use super::above::same_above;
 use super::spots::{Spot, bounds_m};
+use crate::beams::Seen;
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::float::least;
 
@@ -48,6 +49,9 @@ pub(super) struct Look {
     pub(super) sensor_m: Vector2<f64>,
     /// Its velocity over the ground, 0 where no pose is known.
     pub(super) sensor_mps: Vector2<f64>,
+    /// Returns whose place was seen empty before, and something in it.
+    pub(super) new: f64,
+    pub(super) old: f64,
 }
 
 /// What begins higher has lost its wheels and bumpers to the ground, or between two layers.
@@ -100,6 +104,12 @@ impl Look {
             f64::MAX
         };
         let upper_m = extent_m(spots, |above_m| above_m > UPPER_M, FEWEST_UPPER);
+        let returns_seen = |before: Seen| {
+            let seen = spots.iter().filter(|spot| spot.before == before);
+            seen.map(|spot| f64::from(spot.returns)).sum()
+        };
+        let [new, old]: [f64; 2] = [Seen::Empty, Seen::Occupied].map(returns_seen);
+        let is_upright = may_be_upright(spots, scan, range_m);
         let columns = Columns::of(spots, scan);
         let ends_m = columns
             .ends
@@ -125,13 +135,34 @@ impl Look {
             is_one_of_several: false,
             sensor_m,
             sensor_mps: Vector2::zeros(),
+            new: if is_upright { new } else { 0.0 },
+            old: if is_upright { old } else { old + new },
         }
+    }
+
+    /// Whether it is where nothing was before.
+    pub(super) fn is_new(&self) -> bool {
+        const FEWEST: f64 = 4.0;
+        self.new >= FEWEST && self.new > self.old
     }
 
     /// Direction from the sensor, as a unit vector.
     pub(super) fn sight(&self) -> Vector2<f64> {
         (self.middle_m - self.sensor_m) / self.range_m.max(0.1)
     }
+}
+
+/// Whether what is in places that were empty may stand upright: a rail or the rim of a bank, which rays of the past
+/// passed above and below, is met by a single layer, where a road user is met by several.
+fn may_be_upright(spots: &[Spot], scan: &Scan, range_m: f64) -> bool {
+    /// The lowest road users: children, pushchairs, dogs.
+    const LOWEST_M: f64 = 0.9;
+    let step_m = range_m * (scan.slope(MAX_LAYERS / 2).0 - scan.slope(MAX_LAYERS / 2 - 1).0);
+    let new = spots.iter().filter(|spot| spot.before == Seen::Empty);
+    let layers = new.fold(0u32, |layers, spot| {
+        layers | 1 << scan.layer(spot.point as usize)
+    });
+    layers.count_ones() > 1 || step_m > LOWEST_M
 }
 
 /// Whether something nearer hides what is above a point.

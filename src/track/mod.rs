@@ -39,6 +39,8 @@ mod nearby;
 
 mod nearest;
 
+mod newcomers;
+
 mod objects;
 
 mod parts;
@@ -63,12 +65,15 @@ mod strays;
 
 mod thinning;
 
+mod trace;
+
 mod trail;
 
 mod view;
 
 pub use class::Class;
 
+use crate::beams::Beams;
 use crate::cloud::Scan;
 use crate::cluster::Clusters;
 use crate::ego::{Anchor, Placement, Pose, Sweep};
@@ -200,6 +205,8 @@ pub struct Scene<'a> {
     pub sweep: &'a Sweep,
     /// How the points of each column are placed.
     pub placements: &'a [Placement],
+    /// What was seen of their places before.
+    pub beams: &'a Beams,
 }
 
 /// The track step.
@@ -336,6 +343,7 @@ mod tests {
             ground: &ground,
             sweep: &sweep,
             placements: &placements,
+            beams: &Beams::default(),
         })
     }
 }

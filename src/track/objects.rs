@@ -35,8 +35,9 @@ pub(super) struct ObjectTracker {
     /// Places of the tracks, and how far they reach.
     places: Vec<(Rectangle, Outline)>,
     reaches: Discs,
-    /// How likely each track exists.
+    /// How likely each track exists, and whether it is no road user.
     odds: Vec<f64>,
+    background: Vec<bool>,
 }
 
 /// Returns of a single low layer that show a vehicle.
@@ -228,16 +229,17 @@ impl ObjectTracker {
                 continue;
             }
             let middle_m = group.look.middle_m;
-            let is_piece = self
-                .reaches
-                .near(middle_m)
-                .any(|number| self.places[number].1.contains(middle_m.into()));
+            let is_new = group.look.is_new();
+            let is_piece = self.reaches.near(middle_m).any(|number| {
+                let is_before = is_new && self.tracks[number].is_background();
+                !is_before && self.places[number].1.contains(middle_m.into())
+            });
             let spots = self.grouping.spots(group);
             // Of a vehicle that is far away a single layer may show the bumper.
             let may_be_bumper = group.look.points >= BUMPER_RETURNS
                 && group.look.top_below_m > parameters.lowest_object_m;
             let is_low = group.look.top_m < parameters.lowest_object_m && !may_be_bumper;
-            if is_piece || is_low || group.look.goes_on > MOST_GOES_ON {
+            if is_piece || is_low || (!is_new && group.look.goes_on > MOST_GOES_ON) {
                 continue;
             }
             let floor_z_m = floor_z_m(spots, scene);
@@ -270,7 +272,11 @@ impl ObjectTracker {
                 track.odds()
             }
         }));
+        self.background.clear();
+        self.background
+            .extend(self.tracks.iter().map(Track::is_background));
         let (places, odds, reaches) = (&self.places, &self.odds, &mut self.reaches);
+        let background = &self.background;
         let mut number = 0;
         let dropped = self.tracks.extract_if(.., |_| {
             let own = number;
@@ -283,7 +289,8 @@ impl ObjectTracker {
                 let is_better = (odds[other], Reverse(other)) > (odds[own], Reverse(own));
                 let (place, outline) = &places[other];
                 let depth_m = 0.3 * place.width_m.min(1.6);
-                is_better && outline.distance_m(centre_m) < -depth_m
+                let is_before = background[other] && !background[own];
+                is_better && !is_before && outline.distance_m(centre_m) < -depth_m
             })
         });
         self.lost.retain(|track| track.may_return(end));

@@ -1,8 +1,11 @@
 //! Returns of one revolution that may be road users, placed, cluster by cluster and part by part.
 
 use super::above::Climber;
+use super::forecast::Forecasts;
+use super::newcomers::{self, Newcomers};
 use super::parts::{CUT_M, Parts};
 use super::placing::{Bounds, Placed, Placing};
+use super::spots::seen_before;
 use super::thinning::Thinning;
 use super::{Scene, TrackParameters, people};
 use crate::cluster::Clusters;
@@ -19,6 +22,10 @@ pub(super) struct Patch {
     goes_on: bool,
     /// It was cut off something that is no road user, and may be a piece of that.
     pub(super) is_suspect: bool,
+    /// It is where nothing was before.
+    pub(super) is_new: bool,
+    /// It is where something was before.
+    pub(super) is_old: bool,
     /// How many returns each of its own stands for, on average.
     pub(super) returns_each: f32,
     /// One of several people: their patches follow each other, so many before this one and after.
@@ -59,6 +66,9 @@ pub(super) struct Placer {
     placed: Vec<Placed>,
     patches: Vec<Patch>,
     parts: Parts,
+    newcomers: Newcomers,
+    /// The tracks that move and may be in a patch.
+    near: Vec<usize>,
     /// The patches before people were told apart, and where one of them is cut.
     former: Vec<Patch>,
     cuts: Vec<usize>,
@@ -74,6 +84,7 @@ impl Placer {
     pub(super) fn place(
         &mut self,
         clusters: &Clusters,
+        forecasts: &mut Forecasts,
         scene: &Scene<'_>,
         parameters: &TrackParameters,
     ) {
@@ -107,6 +118,8 @@ impl Placer {
                 bounds,
                 goes_on: false,
                 is_suspect: false,
+                is_new: false,
+                is_old: false,
                 returns_each,
                 beside: [0; 2],
             };
@@ -122,7 +135,76 @@ impl Placer {
                 }
             }
         }
+        self.look_back(forecasts, scene);
+        self.part_newcomers(forecasts, scene);
         self.tell_people_apart(scene);
+    }
+
+    /// Looks up what was in the place of every return before. What moves may have been there itself.
+    fn look_back(&mut self, forecasts: &mut Forecasts, scene: &Scene<'_>) {
+        for patch in &self.patches {
+            self.near.clear();
+            self.near.extend(forecasts.near(patch));
+            self.near.retain(|track| forecasts.of(*track).moves());
+            for placed in &mut self.placed[patch.begin..patch.end] {
+                let at_m = placed.at_m;
+                placed.before = seen_before(scene, placed.point, at_m, |past| {
+                    let was_there = |track: &usize| forecasts.of(*track).reached(at_m, past);
+                    self.near.iter().any(was_there)
+                });
+            }
+        }
+    }
+
+    /// Makes a patch of what is in places that were empty, where it touches what stands.
+    fn part_newcomers(&mut self, forecasts: &mut Forecasts, scene: &Scene<'_>) {
+        std::mem::swap(&mut self.patches, &mut self.former);
+        self.patches.clear();
+        for patch in &self.former {
+            self.near.clear();
+            self.near.extend(forecasts.near(patch));
+            self.near.retain(|track| forecasts.of(*track).is_new);
+            let is_moving = |placed: &Placed| {
+                let holds = |track: &usize| forecasts.of(*track).holds(placed.at_m);
+                self.near.iter().any(holds)
+            };
+            let placed = &mut self.placed[patch.begin..patch.end];
+            self.newcomers
+                .part(placed, scene.scan, is_moving, &mut self.cuts);
+            let mut begin = patch.begin;
+            for end in self.cuts.iter().map(|cut| patch.begin + cut) {
+                self.patches.push(Patch {
+                    begin,
+                    end,
+                    bounds: Bounds::of(&self.placed[begin..end]),
+                    goes_on: false,
+                    is_suspect: false,
+                    is_new: true,
+                    is_old: false,
+                    ..*patch
+                });
+                begin = end;
+            }
+            let rest = &self.placed[begin..patch.end];
+            if begin == patch.begin {
+                let [new, old] = newcomers::known(rest);
+                self.patches.push(Patch {
+                    is_new: new > old && new >= newcomers::FEWEST,
+                    is_old: old > new && old >= newcomers::FEWEST,
+                    ..*patch
+                });
+            } else if !rest.is_empty() {
+                self.patches.push(Patch {
+                    begin,
+                    is_old: true,
+                    bounds: Bounds {
+                        top_m: patch.bounds.top_m,
+                        ..Bounds::of(rest)
+                    },
+                    ..*patch
+                });
+            }
+        }
     }
 
     /// Makes a patch of each of several people that are one.
@@ -184,6 +266,8 @@ impl Placer {
                     bounds,
                     goes_on: is_too_tall && goes_on,
                     is_suspect: false,
+                    is_new: false,
+                    is_old: false,
                     returns_each: 1.0,
                     beside: [0; 2],
                 });
@@ -207,7 +291,12 @@ mod tests {
         with_scene(&scan, |scene| {
             let mut dbscan = Dbscan::new(&ClusterParameters::profile(Profile::Default));
             let clusters = dbscan.process(&scan, &vec![false; scan.len()], scene.heights_m);
-            placer.place(clusters, scene, &TrackParameters::profile(Profile::Default));
+            placer.place(
+                clusters,
+                &mut Forecasts::default(),
+                scene,
+                &TrackParameters::profile(Profile::Default),
+            );
         });
         (placer, scan)
     }

@@ -152,6 +152,7 @@ fn distance_m(from_m: [f32; 2], to_m: [f32; 2]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::beams::Seen;
     use crate::cloud::tests::scan_of;
     use crate::track::tests::spots_of;
 
@@ -174,6 +175,7 @@ mod tests {
                 above_m: spot.above_m,
                 point: spot.point,
                 is_brought: false,
+                before: Seen::Unknown,
             })
             .collect();
         let mut found = vec![];

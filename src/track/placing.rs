@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::{Scene, seam};
+use crate::beams::Seen;
 use crate::cloud::MAX_LAYERS;
 use crate::float::{bounds_of, greatest, least};
 
@@ -45,6 +46,8 @@ pub(super) struct Placed {
     pub(super) point: u32,
     /// Whether it is placed where it would be seen at the end.
     pub(super) is_brought: bool,
+    /// What was seen of its place before.
+    pub(super) before: Seen,
 }
 
 /// The box that holds some returns.
@@ -199,6 +202,7 @@ impl Placing {
             above_m: above_m[at],
             point: point[at],
             is_brought: begin + at < self.brought,
+            before: Seen::Unknown,
         })
     }
 

@@ -1,6 +1,9 @@
 //! Returns of one revolution that may be road users.
 
+use nalgebra::Vector3;
+
 use super::Scene;
+use crate::beams::Seen;
 use crate::float::{greatest, least};
 
 /// One return.
@@ -18,6 +21,8 @@ pub(super) struct Spot {
     pub(super) returns: f32,
     /// The group that it belongs to.
     pub(super) group: u32,
+    /// What was seen of its place before.
+    pub(super) before: Seen,
 }
 
 impl Spot {
@@ -25,6 +30,7 @@ impl Spot {
     pub(super) fn new(scene: &Scene<'_>, point: u32, at_m: [f32; 2], group: u32) -> Self {
         let column = scene.scan.column(point as usize);
         Self {
+            before: Seen::Unknown,
             at_m,
             above_m: scene.heights_m[point as usize],
             age_s: scene.scan.age_s(column) as f32,
@@ -33,6 +39,21 @@ impl Spot {
             group,
         }
     }
+}
+
+/// What was seen before of the place of a point of the scan, but for what `is_own`.
+pub(super) fn seen_before(
+    scene: &Scene<'_>,
+    point: u32,
+    at_m: [f32; 2],
+    is_own: impl Fn(usize) -> bool,
+) -> Seen {
+    let attitude = &scene.sweep.attitude;
+    let point_m = Vector3::from(scene.scan.point_m(point as usize)).map(f64::from);
+    let [x, y, _] = scene.sweep.sensor.position_m;
+    let z_m = attitude.place(&point_m).z;
+    let at_m = Vector3::new(x + f64::from(at_m[0]), y + f64::from(at_m[1]), z_m);
+    scene.beams.seen(scene.sweep.epoch, &at_m, is_own)
 }
 
 /// Where spots are, relative to where the sensor is at the end of the sweep.

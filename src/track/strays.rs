@@ -7,7 +7,7 @@ use multiversion::multiversion;
 
 use super::Scene;
 use super::road_user::Track;
-use super::spots::Spot;
+use super::spots::{Spot, seen_before};
 use crate::geometry::Rectangle;
 use crate::marks::marked;
 
@@ -70,7 +70,10 @@ impl Strays {
                     if outline.distance_m(at_m) < near_m {
                         let (point, group) = (point as u32, number as u32);
                         let offset_m = [0, 1].map(|axis| (at_m[axis] - origin_m[axis]) as f32);
-                        spots.push(Spot::new(scene, point, offset_m, group));
+                        spots.push(Spot {
+                            before: seen_before(scene, point, offset_m, |_| true),
+                            ..Spot::new(scene, point, offset_m, group)
+                        });
                     }
                 }
             }
@@ -131,6 +134,7 @@ fn mark_strays(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::beams::Seen;
 
     #[test]
     fn a_track_is_seen_if_it_has_spots_of_this_revolution() {
@@ -141,6 +145,7 @@ mod tests {
             returns: 1.0,
             point: 0,
             group,
+            before: Seen::Unknown,
         };
         let mut strays = Strays::default();
         strays.note_seen(3, &[spot(1), spot(7)]);

@@ -89,7 +89,10 @@ impl Grouping {
         scene: &Scene<'_>,
         parameters: &TrackParameters,
     ) {
-        self.placer.place(clusters, scene, parameters);
+        let origin_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
+        self.forecasts.take(tracks, origin_m, scene);
+        self.placer
+            .place(clusters, &mut self.forecasts, scene, parameters);
         self.divide(tracks, scene, parameters);
         let members = self.placer.members();
         self.strays.add(tracks, members, scene, &mut self.spots);
@@ -119,8 +122,6 @@ impl Grouping {
     /// Gives every return a group: the track in whose place it lies, or its own patch, if that
     /// can be a road user.
     fn divide(&mut self, tracks: &[Track], scene: &Scene<'_>, parameters: &TrackParameters) {
-        let origin_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
-        self.forecasts.take(tracks, origin_m);
         self.suspects.clear();
         self.people.clear();
         self.large_patches.clear();
@@ -140,7 +141,7 @@ impl Grouping {
             let begin = self.spots.len();
             let placed = self.placer.placed(&patch);
             self.claims
-                .settle(placed, &self.near, &self.forecasts, is_whole);
+                .settle(placed, &self.near, &self.forecasts, is_whole, patch.is_old);
             if patch.is_one_of_several() {
                 let owners = self.claims.owners().flatten();
                 let people = owners.filter(|track| !tracks[*track].is_vehicle());
@@ -149,7 +150,8 @@ impl Grouping {
             }
             let owner = is_whole
                 .then(|| self.owner(&patch, tracks, scene.scan.time()))
-                .flatten();
+                .flatten()
+                .filter(|(track, _)| !(patch.is_old && self.forecasts.of(*track).is_new));
             let owns = owner.map(|(track, _)| track);
             if is_whole {
                 self.count_things(&patch, owns, tracks);
@@ -164,6 +166,7 @@ impl Grouping {
                 if let Some(group) = group.filter(|_| !track.is_some_and(rests)) {
                     let mut spot = Spot::new(scene, placed.point, placed.at_m, group);
                     spot.returns = patch.returns_each;
+                    spot.before = placed.before;
                     if placed.is_brought {
                         spot.age_s -= scene.scan.duration_s() as f32;
                     }
@@ -196,6 +199,10 @@ impl Grouping {
             self.near.retain(|track| {
                 tracks[*track].is_vehicle() || forecasts.is_nearest(*track, patches, number)
             });
+        }
+        if patch.is_new {
+            // It is before what stands there, and none of it.
+            self.near.retain(|track| !tracks[*track].is_background());
         }
         let middle_m = patch.bounds.middle_m();
         let is_known_vehicle = |track: &usize| {

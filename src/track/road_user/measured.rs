@@ -17,6 +17,14 @@ const FAST_MPS: f64 = 1.5;
 /// Of what is structure for sure motion says nothing, if it is as long as this: shorter ones are
 /// seen whole.
 const LONG_M: f64 = 2.5;
+/// Share of returns in places that were empty from which on something moved there: fitted by scripts/fit-newness.
+const LEAST_NEW: f64 = 0.6;
+/// The same below which what was thought to move stands.
+const LEAST_MOVED: f64 = 0.2;
+/// Share of its returns in places where something else was from which on it stands, however it seems to go, unless it is
+/// known to have gone so far.
+const MOST_OLD: f64 = 0.5;
+const SURE_WAY_M: f64 = 5.0;
 /// How much higher than known something may be where a ray passes far away.
 const HIGHER_M: f64 = 0.4;
 
@@ -65,6 +73,9 @@ impl Track {
             let known_m = self.lower_m.get_or_insert(fresh_m);
             *known_m += 0.2 * (fresh_m - *known_m);
         }
+        self.new += 0.2 * (look.new - self.new);
+        self.old += 0.2 * (look.old - self.old);
+        self.trace.push(seen_at, self.motion.estimate().position_m);
         self.note_motion(look);
         self.is_carried = self.goes_like_a_rail(look, spots);
         if self.parted.is_renewed_by(look.points, seen_at) {
@@ -130,15 +141,31 @@ impl Track {
     fn note_motion(&mut self, look: &Look) {
         let estimate = self.motion.estimate();
         // Of walls behind what is near, another piece is seen in every revolution.
-        if self.belief.road_user() < SURELY_NONE && self.shape.seen_m[0] > LONG_M {
+        if !self.is_new() && self.belief.road_user() < SURELY_NONE && self.shape.seen_m[0] > LONG_M
+        {
             (self.moves, self.travelled_m) = (false, 0.0);
             self.born_m = estimate.position_m;
             return;
         }
+        let is_old = self.newness().is_some_and(|newness| newness < LEAST_MOVED);
+        if is_old {
+            self.new_way_m *= 0.8;
+        }
+        let is_much = self.new_way_m < SURE_WAY_M && self.old > MOST_OLD * self.usual_points;
+        if self.moves && is_old && (is_much || estimate.standing > 0.5) {
+            // It clings to something that stood there before it came.
+            (self.moves, self.travelled_m, self.new_way_m) = (false, 0.0, 0.0);
+            (self.born_m, self.new_from_m) = (estimate.position_m, None);
+        }
         let speed_mps = estimate.velocity_mps.norm();
         let is_moving = estimate.standing < 0.1 && speed_mps > MOVING_MPS;
-        if is_moving && self.trails.shows_motion(self.shape.seen_m[0], look) {
+        let is_new = self.newness().is_none_or(|newness| newness > LEAST_NEW);
+        if is_moving && is_new && self.trails.shows_motion(self.shape.seen_m[0], look) {
             self.moves = true;
+            if self.is_new() {
+                let from_m = *self.new_from_m.get_or_insert(estimate.position_m);
+                self.new_way_m = self.new_way_m.max((estimate.position_m - from_m).norm());
+            }
             let travelled_m = (estimate.position_m - self.born_m).norm();
             self.travelled_m = self.travelled_m.max(travelled_m);
         }
@@ -150,6 +177,29 @@ impl Track {
             };
             self.speed_mps += gain * (speed_mps - self.speed_mps);
         }
+    }
+
+    /// The share of its returns of late, of those whose place was seen before, whose place was empty; `None` where too few
+    /// tell.
+    pub(in crate::track) fn newness(&self) -> Option<f64> {
+        /// Returns, and share of them.
+        const FEWEST: f64 = 2.0;
+        const LEAST_SHARE: f64 = 0.1;
+        let known = self.new + self.old;
+        (known >= FEWEST.max(LEAST_SHARE * self.usual_points)).then(|| self.new / known)
+    }
+
+    /// Whether it was of late where nothing was before.
+    pub(in crate::track) fn is_new(&self) -> bool {
+        self.newness().is_some_and(|newness| newness > LEAST_NEW)
+    }
+
+    /// Whether it moves for sure, or did and went far: as a whole, and to where nothing was.
+    fn surely_moves(&self) -> bool {
+        const LEAST_WAY_M: f64 = 0.1;
+        const FAR_M: f64 = 1.5;
+        let stands = self.motion.standing() > 0.5;
+        self.moves && self.new_way_m > if stands { FAR_M } else { LEAST_WAY_M }
     }
 
     /// Whether it goes with the sensor as what is met of a rail does: a layer meets it at one
@@ -209,6 +259,7 @@ impl Track {
             roughness_m: self.roughness_m,
             speed_mps: self.speed_mps,
             moved: self.moves && !self.is_carried && self.travelled_m > self.telling_way_m(),
+            surely_moves: self.surely_moves(),
             whole_m: (self.shape.whole[0] > 0.3).then_some(length_m),
             wide_m: (self.shape.whole[1] > 0.5).then_some(width_m),
             range_m: self.range_m,

@@ -18,6 +18,7 @@ use super::motion::Motion;
 use super::shape::{Shape, is_tall};
 use super::sight::Sight;
 use super::spots::Spot;
+use super::trace::Trace;
 use super::trail::Trails;
 use super::view::View;
 use crate::geometry::Rectangle;
@@ -76,6 +77,12 @@ pub(super) struct Track {
     /// Whether it was seen to move, and how far.
     moves: bool,
     travelled_m: f64,
+    /// Returns of late whose place was seen empty before, and something in it.
+    new: f64,
+    old: f64,
+    /// Where it was when it was first seen to move to where nothing was, and how far it went from there.
+    new_from_m: Option<Vector2<f64>>,
+    new_way_m: f64,
     /// Whether its motion may be the sensor's.
     is_carried: bool,
     is_suspect: bool,
@@ -84,6 +91,7 @@ pub(super) struct Track {
     /// Where it was first seen, since its frame is the same.
     born_m: Vector2<f64>,
     trails: Trails,
+    trace: Trace,
     existence: Existence,
     points: usize,
     /// Mean of the returns of late, where there were any.
@@ -127,11 +135,16 @@ impl Track {
             speed_mps: 0.0,
             moves: false,
             travelled_m: 0.0,
+            new: look.new,
+            old: look.old,
+            new_from_m: None,
+            new_way_m: 0.0,
             is_carried: false,
             is_suspect,
             is_cut: look.is_cut != [false; 2],
             born_m: look.middle_m,
             trails: Trails::default(),
+            trace: Trace::default(),
             existence: Existence::new(),
             points: look.points,
             usual_points: look.points as f64,
@@ -229,9 +242,30 @@ impl Track {
         self.moves && self.velocity_mps().norm() > LEAST_MPS
     }
 
+    /// Whether it was ever seen to move.
+    pub(super) fn has_moved(&self) -> bool {
+        self.moves
+    }
+
+    /// The time for which everything holds.
+    pub(super) fn time(&self) -> Time {
+        self.time
+    }
+
+    /// Where it was at a time of late.
+    pub(super) fn was_at_m(&self, time: Time) -> Option<Vector2<f64>> {
+        self.trace.at(time)
+    }
+
     /// Whether it may turn out to be a piece of something.
     pub(super) fn is_young(&self, now: Time) -> bool {
         !self.is_published && !self.rests && (now - self.first_seen).seconds() < YOUNG_S
+    }
+
+    /// Whether it stands and is rather no road user: what comes before it is none of it.
+    pub(super) fn is_background(&self) -> bool {
+        const HARDLY: f64 = 0.25;
+        !self.moves && !self.is_new() && self.belief.road_user() < HARDLY
     }
 
     /// Whether it is rather a vehicle than anything else on the road.
@@ -378,6 +412,8 @@ impl Track {
         self.motion.reframe(sine, cosine, moved);
         self.shape.yaw_rad = crate::ego::wrapped_rad(self.shape.yaw_rad + turn_rad);
         self.trails.reframe(moved);
+        self.trace.clear();
+        self.new_from_m = None;
         self.born_m = Vector2::from(moved(self.born_m.into()));
         self.parted.reframe((sine, cosine), moved);
         self.floor_z_m += rise_m;

@@ -1,0 +1,191 @@
+//! One revolution of the past, as an image of ranges.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::Seen;
+use crate::cloud::{Azimuths, MAX_LAYERS, Scan};
+use crate::ego::{Placement, Pose, Sweep};
+use crate::geometry::Rectangle;
+use crate::time::Time;
+
+/// Ranges, and where the sensor was.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Past {
+    time: Time,
+    azimuths: Azimuths,
+    /// Negative on the ground, which a ray ends on without meeting anything; 0 where nothing is known, and not a number
+    /// where something moved: what came and went says nothing of what stands.
+    range_m: Vec<f32>,
+    placements: Vec<Placement>,
+    /// Height of the sensor, and the turn from its axes to level ones.
+    z_m: f64,
+    tilt: Matrix3<f64>,
+    /// Tangents of the layers' elevations, ascending, and how many layers there are.
+    tangents: [f64; MAX_LAYERS],
+    layers: usize,
+}
+
+/// Metres and part of a range by which a ray must end beyond a place to have passed it, and within which it met something
+/// there: noise of the range, of the pose, and of where surfaces are between rays.
+const MARGIN_M: f64 = 0.25;
+const MARGIN: f64 = 0.01;
+/// How far around the box of what moves its returns may be: it goes on during the sweep.
+const AROUND_M: f64 = 0.5;
+/// Rays to the left and right that are asked, too, and how many of them must have passed in the layers above and below.
+const BESIDE: usize = 1;
+const FEWEST_PASSED: u32 = 2;
+/// Part of the step between layers up to which what a ray met reaches up and down.
+const REACH: f64 = 1.3;
+
+impl Past {
+    pub(super) fn forget(&mut self) {
+        self.range_m.clear();
+    }
+
+    pub(super) fn time(&self) -> Time {
+        self.time
+    }
+
+    pub(super) fn take(
+        &mut self,
+        scan: &Scan,
+        ground: &[bool],
+        moving: &[Rectangle],
+        sweep: &Sweep,
+        placements: &[Placement],
+    ) {
+        self.time = scan.time();
+        self.azimuths = scan.azimuths();
+        self.range_m.clear();
+        let returns = scan.range_m().iter().zip(ground);
+        self.range_m.extend(returns.map(|(range_m, is_ground)| {
+            if *is_ground {
+                -range_m
+            } else {
+                range_m.max(0.0)
+            }
+        }));
+        moving
+            .iter()
+            .for_each(|rectangle| self.leave_out(scan, rectangle));
+        self.placements.clear();
+        self.placements.extend_from_slice(placements);
+        self.z_m = sweep.attitude.translation_m.z;
+        let level = Pose {
+            position_m: [0.0; 3],
+            ..Pose::of(&sweep.attitude)
+        };
+        self.tilt = level.rigid().rotation.transpose() * sweep.attitude.rotation;
+        self.layers = scan.sensor().elevation_deg.len();
+        self.tangents = std::array::from_fn(|layer| scan.slope(layer).0);
+    }
+
+    /// Leaves out what was met in and around a box in the sensor frame.
+    fn leave_out(&mut self, scan: &Scan, moving: &Rectangle) {
+        let around = Rectangle {
+            length_m: moving.length_m + 2.0 * AROUND_M,
+            width_m: moving.width_m + 2.0 * AROUND_M,
+            ..*moving
+        };
+        let outline = around.outline();
+        for columns in scan.stretches_across(&around.corners()) {
+            for point in columns.start * MAX_LAYERS..columns.end * MAX_LAYERS {
+                let [x, y, _] = scan.point_m(point).map(f64::from);
+                if self.range_m[point] > 0.0 && outline.contains([x, y]) {
+                    self.range_m[point] = f32::NAN;
+                }
+            }
+        }
+    }
+
+    /// What was seen of a place in the odometry frame.
+    pub(super) fn seen(&self, at_m: &Vector3<f64>) -> Seen {
+        if self.range_m.is_empty() {
+            return Seen::Unknown;
+        }
+        let Some((column, from_m)) = self.find(at_m) else {
+            return Seen::Unknown;
+        };
+        let distance_m = libm::hypot(from_m.x, from_m.y);
+        let tangent = from_m.z / distance_m;
+        let tangents = &self.tangents[..self.layers];
+        let above = tangents.partition_point(|own| *own <= tangent);
+        if above == 0 || above == self.layers {
+            return Seen::Unknown;
+        }
+        let range_m = libm::hypot(distance_m, from_m.z);
+        let margin_m = MARGIN_M + MARGIN * range_m;
+        let place = Place {
+            column,
+            near_m: (range_m - margin_m) as f32,
+            far_m: (range_m + margin_m) as f32,
+        };
+        let reach = REACH * (tangents[above] - tangents[above - 1]);
+        let is_near = |layer: &usize| (tangents[*layer] - tangent).abs() < reach;
+        let farther = [above.wrapping_sub(2), above + 1];
+        let farther = farther
+            .into_iter()
+            .filter(|layer| *layer < self.layers && is_near(layer));
+        let [below, above] = [above - 1, above].map(|layer| self.ask(layer, &place));
+        if below.met || above.met || farther.into_iter().any(|layer| self.ask(layer, &place).met) {
+            Seen::Occupied
+        } else if [below, above].iter().all(Answer::has_passed) {
+            Seen::Empty
+        } else {
+            Seen::Unknown
+        }
+    }
+
+    /// The column that looked at a place, and where the place is from its sensor.
+    fn find(&self, at_m: &Vector3<f64>) -> Option<(usize, Vector3<f64>)> {
+        let columns = self.azimuths.columns();
+        let mut column = columns / 2;
+        let mut from_m = Vector3::zeros();
+        // Where the sensor was by then depends on the column, by little.
+        for _ in 0..2 {
+            let [x, y] = self.placements[column].sensor_m([at_m.x, at_m.y]);
+            from_m = self.tilt.tr_mul(&Vector3::new(x, y, at_m.z - self.z_m));
+            column = self.azimuths.column_at(libm::atan2(from_m.x, from_m.y));
+        }
+        (from_m.x != 0.0 || from_m.y != 0.0).then_some((column, from_m))
+    }
+
+    /// What the rays of a layer around a place say of it.
+    fn ask(&self, layer: usize, place: &Place) -> Answer {
+        let columns = self.azimuths.columns();
+        let mut answer = Answer::default();
+        for step in 0..=2 * BESIDE {
+            let column = (place.column + columns + step - BESIDE) % columns;
+            let range_m = self.range_m[column * MAX_LAYERS + layer];
+            if range_m.abs() > place.far_m {
+                answer.passed += 1;
+            } else if range_m >= place.near_m {
+                answer.met = true;
+            } else if range_m > 0.0 {
+                answer.is_blocked = true;
+            }
+        }
+        answer
+    }
+}
+
+/// Where a place is: in which column, and nearer and farther by the margin.
+struct Place {
+    column: usize,
+    near_m: f32,
+    far_m: f32,
+}
+
+/// What some rays say.
+#[derive(Debug, Clone, Copy, Default)]
+struct Answer {
+    passed: u32,
+    met: bool,
+    is_blocked: bool,
+}
+
+impl Answer {
+    fn has_passed(&self) -> bool {
+        !self.is_blocked && self.passed >= FEWEST_PASSED
+    }
+}
