@@ -106,17 +106,21 @@ const DRIFT_STANDING_RAD: f64 = 0.000_05;
 /// How much worse a source is in the long run than from one revolution to the next: what is wrong with it
 /// stays for seconds.
 const LASTING: f64 = 3.0;
+/// How far a sensor goes and turns within the sweep of which the motion is not known.
+const UNKNOWN_WAY_M: f64 = 1.0;
+const UNKNOWN_TURN_RAD: f64 = 0.05;
 /// Time for which a source must say otherwise to be believed.
 const INSISTING: Span = Span::from_micros(1_000_000);
 
 impl Anchoring {
-    /// The odometry frame begins as the local frame.
-    pub(super) fn begin(frame: Frame) -> Self {
+    /// The odometry frame begins as the local frame, at a first reading of a source.
+    pub(super) fn begin(frame: Frame, parameters: &EgoParameters) -> Self {
+        let [metres, radians] = lasting(parameters);
         Self {
             anchor: Anchor::IDENTITY,
             frame,
-            variance_m2: 0.0,
-            variance_rad2: 0.0,
+            variance_m2: metres * metres,
+            variance_rad2: radians * radians,
             last: None,
             otherwise: None,
             off_m: 0.0,
@@ -125,11 +129,22 @@ impl Anchoring {
     }
 
     /// The frames are tied together where the sensor is now.
-    pub(super) fn at(frame: Frame, odometry: &Pose, local: &Pose) -> Self {
+    pub(super) fn at(
+        frame: Frame,
+        odometry: &Pose,
+        local: &Pose,
+        parameters: &EgoParameters,
+    ) -> Self {
         Self {
             anchor: Anchor::between(odometry, local),
-            ..Self::begin(frame)
+            ..Self::begin(frame, parameters)
         }
+    }
+
+    /// It is not known how fast the sensor went when the frame began, and so how far until it is.
+    pub(super) fn doubt_begin(&mut self) {
+        self.variance_m2 += UNKNOWN_WAY_M * UNKNOWN_WAY_M;
+        self.variance_rad2 += UNKNOWN_TURN_RAD * UNKNOWN_TURN_RAD;
     }
 
     pub(super) fn anchor(&self) -> (Frame, Anchor) {
@@ -165,23 +180,20 @@ impl Anchoring {
                 *self = Self {
                     jumps: self.jumps + 1,
                     last: self.last,
-                    ..Self::at(frame, odometry, source)
+                    ..Self::at(frame, odometry, source, parameters)
                 };
             }
             return;
         }
         self.otherwise = None;
         let gain = |variance: &mut f64, deviation: f64| {
-            let noise = (LASTING * deviation) * (LASTING * deviation);
-            let gain = *variance / (*variance + noise);
+            let gain = *variance / (*variance + deviation * deviation);
             *variance *= 1.0 - gain;
             gain
         };
-        let by_m = gain(&mut self.variance_m2, parameters.pose_deviation_m);
-        let by_rad = gain(
-            &mut self.variance_rad2,
-            parameters.pose_deviation_deg.to_radians(),
-        );
+        let [metres, radians] = lasting(parameters);
+        let by_m = gain(&mut self.variance_m2, metres);
+        let by_rad = gain(&mut self.variance_rad2, radians);
         let corrected = Pose {
             position_m: [0, 1, 2].map(|axis| here.position_m[axis] + by_m * off_m[axis]),
             yaw_rad: wrapped_rad(here.yaw_rad + by_rad * off_rad),
@@ -216,16 +228,17 @@ impl Anchoring {
         if self.otherwise.is_some() || self.is_far(off_m, off_rad, parameters) {
             return;
         }
-        let deviation_m = libm::hypot(
-            LASTING * parameters.pose_deviation_m,
-            libm::sqrt(self.variance_m2),
-        );
-        let deviation_rad = libm::hypot(
-            LASTING * parameters.pose_deviation_deg.to_radians(),
-            libm::sqrt(self.variance_rad2),
-        );
+        let [metres, radians] = lasting(parameters);
+        let deviation_m = libm::hypot(metres, libm::sqrt(self.variance_m2));
+        let deviation_rad = libm::hypot(radians, libm::sqrt(self.variance_rad2));
         odometry.guide(&at.rigid(), deviation_m, deviation_rad);
     }
+}
+
+/// How far a source is off in the long run: standard deviations in metres and radians.
+fn lasting(parameters: &EgoParameters) -> [f64; 2] {
+    let radians = parameters.pose_deviation_deg.to_radians();
+    [LASTING * parameters.pose_deviation_m, LASTING * radians]
 }
 
 #[cfg(test)]
@@ -269,7 +282,7 @@ mod tests {
 
     #[test]
     fn drift_is_followed_slowly_and_an_outlier_is_not() {
-        let mut anchoring = Anchoring::begin(Frame::Earth);
+        let mut anchoring = Anchoring::begin(Frame::Earth, &parameters());
         drive(&mut anchoring, 0..600, |step| 0.002 * step as f64);
         let off_m = anchoring.anchor().1.place_m([600.0, 0.0, 0.0])[1];
         assert!((off_m - 1.2).abs() < 0.2, "{off_m}");
@@ -281,7 +294,7 @@ mod tests {
 
     #[test]
     fn a_jump_that_persists_moves_the_anchor_at_once() {
-        let mut anchoring = Anchoring::begin(Frame::Earth);
+        let mut anchoring = Anchoring::begin(Frame::Earth, &parameters());
         drive(&mut anchoring, 0..50, |_| 0.0);
         drive(&mut anchoring, 50..65, |_| 5.0);
         let off_m = anchoring.anchor().1.place_m([65.0, 0.0, 0.0])[1];

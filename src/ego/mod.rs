@@ -237,7 +237,11 @@ impl Ego {
                 before.step_to(&sensor.rigid()) / scan.duration_s()
             });
             self.odometry.begin(&sensor.rigid(), velocity);
-            self.anchoring = Some(Anchoring::begin(source.frame()));
+            let mut anchoring = Anchoring::begin(source.frame(), &self.parameters);
+            if velocity.is_none() {
+                anchoring.doubt_begin();
+            }
+            self.anchoring = Some(anchoring);
         }
         self.begun.get_or_insert(end);
         self.mark(scan, moving);
@@ -259,7 +263,9 @@ impl Ego {
         if let Some((source, sensor)) = &sensor {
             let pose = Pose::of(&self.odometry.pose_at(scan, -0.5 * scan.duration_s()));
             self.anchoring
-                .get_or_insert_with(|| Anchoring::at(source.frame(), &pose, sensor))
+                .get_or_insert_with(|| {
+                    Anchoring::at(source.frame(), &pose, sensor, &self.parameters)
+                })
                 .take(middle, &pose, source.frame(), sensor, &self.parameters);
         }
         self.sweep(scan)
