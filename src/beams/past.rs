@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::Seen;
-use crate::cloud::{Azimuths, MAX_LAYERS, Scan};
+use crate::cloud::{Azimuths, CAPACITY, MAX_COLUMNS, MAX_LAYERS, Scan};
 use crate::ego::{Placement, Pose, Sweep};
 use crate::geometry::Rectangle;
 use crate::time::Time;
@@ -57,6 +57,7 @@ impl Past {
         self.time = scan.time();
         self.azimuths = scan.azimuths();
         self.range_m.clear();
+        self.range_m.reserve(CAPACITY);
         let returns = scan.range_m().iter().zip(ground);
         self.range_m.extend(returns.map(|(range_m, is_ground)| {
             if *is_ground {
@@ -69,6 +70,7 @@ impl Past {
             .iter()
             .for_each(|rectangle| self.leave_out(scan, rectangle));
         self.placements.clear();
+        self.placements.reserve(MAX_COLUMNS);
         self.placements.extend_from_slice(placements);
         self.z_m = sweep.attitude.translation_m.z;
         let level = Pose {
