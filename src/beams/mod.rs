@@ -35,6 +35,8 @@ pub struct Beams {
     kept_at: Option<Time>,
     /// How far the sensor turned in the last sweep, and whether it turned as far in the one before.
     turned_rad: f64,
+    /// Which way it looks at the end of it.
+    yaw_rad: f64,
     is_steady: bool,
 }
 
@@ -58,6 +60,7 @@ impl Beams {
         let turned_rad = wrapped_rad(sweep.sensor.yaw_rad - sweep.pose(0.0).yaw_rad);
         self.is_steady = libm::fabs(turned_rad - self.turned_rad) < STEADY_RAD;
         self.turned_rad = turned_rad;
+        self.yaw_rad = sweep.sensor.yaw_rad;
     }
 
     /// Remembers the revolution of that sweep, if the last one that it did is old enough; to be called after it was
@@ -94,23 +97,35 @@ impl Beams {
         self.pasts.iter().map(Past::time)
     }
 
-    /// What was seen of a place in the odometry frame, as far back as it is known. What `is_own` of a revolution, by its
-    /// number in [`Beams::times`], met there is left out of it: it was what is there now. Nothing is known of what something
-    /// else stood in and left again, and in the frame of another epoch.
-    pub fn seen(&self, epoch: u32, at_m: &Vector3<f64>, is_own: impl Fn(usize) -> bool) -> Seen {
-        let mut told = Seen::Unknown;
+    /// What was seen of a place in the odometry frame, where the sensor now looks at an azimuth, as far back as it is known.
+    /// What `is_own` of a revolution, by its number in [`Beams::times`], met there is left out of it: it was what is there
+    /// now. Nothing is known of what something else stood in and left again, and in the frame of another epoch.
+    pub fn seen(
+        &self,
+        epoch: u32,
+        at_m: &Vector3<f64>,
+        azimuth_rad: f64,
+        is_own: impl Fn(usize) -> bool,
+    ) -> Seen {
         if epoch != self.epoch || !self.is_steady {
-            return told;
+            return Seen::Unknown;
         }
+        let look = |past: &Past| past.seen(at_m, past.guess(azimuth_rad, self.yaw_rad));
         for (number, past) in self.pasts.iter().enumerate() {
-            match (past.seen(at_m), told) {
-                (Seen::Empty, Seen::Unknown) => return Seen::Empty,
-                (Seen::Empty, _) => return Seen::Unknown,
-                (Seen::Occupied, _) if !is_own(number) => told = Seen::Occupied,
+            match look(past) {
+                Seen::Empty => return Seen::Empty,
+                Seen::Occupied if !is_own(number) => {
+                    let is_left = self.pasts.last().map(look) == Some(Seen::Empty);
+                    return if is_left {
+                        Seen::Unknown
+                    } else {
+                        Seen::Occupied
+                    };
+                }
                 _ => {}
             }
         }
-        told
+        Seen::Unknown
     }
 }
 
@@ -156,7 +171,8 @@ mod tests {
     }
 
     fn seen(beams: &Beams, at_m: Vector3<f64>) -> Seen {
-        beams.seen(0, &at_m, |_| false)
+        let azimuth_rad = libm::atan2(at_m.x, at_m.y);
+        beams.seen(0, &at_m, azimuth_rad, |_| false)
     }
 
     #[test]
@@ -214,8 +230,8 @@ mod tests {
     fn what_is_there_now_is_left_out_of_what_was_seen() {
         let beams = beams(&wall(), false, &Pose::SENSOR);
         let at_m = place(20.0, 20.0);
-        assert_eq!(beams.seen(0, &at_m, |past| past == 0), Seen::Unknown);
-        assert_eq!(beams.seen(0, &at_m, |past| past == 1), Seen::Occupied);
+        assert_eq!(beams.seen(0, &at_m, 0.3, |past| past == 0), Seen::Unknown);
+        assert_eq!(beams.seen(0, &at_m, 0.3, |past| past == 1), Seen::Occupied);
     }
 
     #[test]
@@ -265,7 +281,10 @@ mod tests {
         add(&mut beams, &later(&wall(), 0.5), false, &Pose::SENSOR);
         assert_eq!(seen(&beams, place(10.0, 20.0)), Seen::Unknown);
         assert_eq!(seen(&beams, place(5.0, 20.0)), Seen::Empty);
-        assert_eq!(beams.seen(1, &place(5.0, 20.0), |_| false), Seen::Unknown);
+        assert_eq!(
+            beams.seen(1, &place(5.0, 20.0), 0.3, |_| false),
+            Seen::Unknown
+        );
     }
 
     #[test]
@@ -295,7 +314,13 @@ mod tests {
         let other = Sweep::still(1);
         let nearer = scan_of(COLUMNS, |column, _| if column < 200 { 1000 } else { 0 });
         beams.remember(&later(&nearer, 4.0), &ground, &[], &other, &placements);
-        assert_eq!(beams.seen(1, &place(20.0, 20.0), |_| false), Seen::Unknown);
-        assert_eq!(beams.seen(1, &place(10.0, 20.0), |_| false), Seen::Occupied);
+        assert_eq!(
+            beams.seen(1, &place(20.0, 20.0), 0.3, |_| false),
+            Seen::Unknown
+        );
+        assert_eq!(
+            beams.seen(1, &place(10.0, 20.0), 0.3, |_| false),
+            Seen::Occupied
+        );
     }
 }

@@ -17,6 +17,10 @@ pub(super) struct Past {
     /// where something moved: what came and went says nothing of what stands.
     range_m: Vec<f32>,
     placements: Vec<Placement>,
+    /// Sine and cosine of the columns' azimuths.
+    directions: Vec<[f32; 2]>,
+    /// Which way the sensor looked at the end.
+    yaw_rad: f64,
     /// Height of the sensor, and the turn from its axes to level ones.
     z_m: f64,
     tilt: Matrix3<f64>,
@@ -31,8 +35,7 @@ const MARGIN_M: f64 = 0.25;
 const MARGIN: f64 = 0.01;
 /// How far around the box of what moves its returns may be: it goes on during the sweep.
 const AROUND_M: f64 = 0.5;
-/// Rays to the left and right that are asked, too, and how many of them must have passed in the layers above and below.
-const BESIDE: usize = 1;
+/// Of three rays side by side, how many must have passed in the layers above and below.
 const FEWEST_PASSED: u32 = 2;
 /// Part of the step between layers up to which what a ray met reaches up and down.
 const REACH: f64 = 1.3;
@@ -72,6 +75,11 @@ impl Past {
         self.placements.clear();
         self.placements.reserve(MAX_COLUMNS);
         self.placements.extend_from_slice(placements);
+        self.directions.clear();
+        self.directions.reserve(MAX_COLUMNS);
+        self.directions
+            .extend((0..scan.columns()).map(|column| scan.direction(column)));
+        self.yaw_rad = sweep.sensor.yaw_rad;
         self.z_m = sweep.attitude.translation_m.z;
         let level = Pose {
             position_m: [0.0; 3],
@@ -80,6 +88,12 @@ impl Past {
         self.tilt = level.rigid().rotation.transpose() * sweep.attitude.rotation;
         self.layers = scan.sensor().elevation_deg.len();
         self.tangents = std::array::from_fn(|layer| scan.slope(layer).0);
+    }
+
+    /// The column that looked where another azimuth points now, of a sensor that looks `yaw_rad`.
+    pub(super) fn guess(&self, azimuth_rad: f64, yaw_rad: f64) -> usize {
+        self.azimuths
+            .column_at(azimuth_rad + self.yaw_rad - yaw_rad)
     }
 
     /// Leaves out what was met in and around a box in the sensor frame.
@@ -100,25 +114,30 @@ impl Past {
         }
     }
 
-    /// What was seen of a place in the odometry frame.
-    pub(super) fn seen(&self, at_m: &Vector3<f64>) -> Seen {
+    /// What was seen of a place in the odometry frame, by about the column that is guessed.
+    pub(super) fn seen(&self, at_m: &Vector3<f64>, guess: usize) -> Seen {
         if self.range_m.is_empty() {
             return Seen::Unknown;
         }
-        let Some((column, from_m)) = self.find(at_m) else {
+        let Some((column, from_m)) = self.find(at_m, guess) else {
             return Seen::Unknown;
         };
-        let distance_m = libm::hypot(from_m.x, from_m.y);
-        let tangent = from_m.z / distance_m;
+        let square_m2 = from_m.x * from_m.x + from_m.y * from_m.y;
+        let tangent = from_m.z / square_m2.sqrt();
         let tangents = &self.tangents[..self.layers];
         let above = tangents.partition_point(|own| *own <= tangent);
         if above == 0 || above == self.layers {
             return Seen::Unknown;
         }
-        let range_m = libm::hypot(distance_m, from_m.z);
+        let range_m = (square_m2 + from_m.z * from_m.z).sqrt();
         let margin_m = MARGIN_M + MARGIN * range_m;
+        let last = self.azimuths.columns() - 1;
         let place = Place {
-            column,
+            columns: [
+                if column == 0 { last } else { column - 1 },
+                column,
+                if column == last { 0 } else { column + 1 },
+            ],
             near_m: (range_m - margin_m) as f32,
             far_m: (range_m + margin_m) as f32,
         };
@@ -138,26 +157,32 @@ impl Past {
         }
     }
 
-    /// The column that looked at a place, and where the place is from its sensor.
-    fn find(&self, at_m: &Vector3<f64>) -> Option<(usize, Vector3<f64>)> {
-        let columns = self.azimuths.columns();
-        let mut column = columns / 2;
-        let mut from_m = Vector3::zeros();
-        // Where the sensor was by then depends on the column, by little.
+    /// The column that looked at a place, and where the place is from its sensor, beginning with a guess.
+    fn find(&self, at_m: &Vector3<f64>, guess: usize) -> Option<(usize, Vector3<f64>)> {
+        /// Where the sensor was by then depends on the column, but by nothing that counts for one so near to the guess.
+        const NEAR: f64 = 0.1;
+        let mut column = guess.min(self.azimuths.columns() - 1);
         for _ in 0..2 {
             let [x, y] = self.placements[column].sensor_m([at_m.x, at_m.y]);
-            from_m = self.tilt.tr_mul(&Vector3::new(x, y, at_m.z - self.z_m));
+            let from_m = self.tilt.tr_mul(&Vector3::new(x, y, at_m.z - self.z_m));
+            let [sine, cosine] = self.directions[column].map(f64::from);
+            let ahead_m = from_m.x * sine + from_m.y * cosine;
+            let aside = (from_m.x * cosine - from_m.y * sine) / ahead_m;
+            if ahead_m > 0.0 && aside.abs() < NEAR {
+                // The arc tangent, to 2e-6.
+                let turn_rad = aside - aside * aside * aside / 3.0;
+                let column = self.azimuths.column_beside(column, turn_rad)?;
+                return Some((column, from_m));
+            }
             column = self.azimuths.column_at(libm::atan2(from_m.x, from_m.y));
         }
-        (from_m.x != 0.0 || from_m.y != 0.0).then_some((column, from_m))
+        None
     }
 
     /// What the rays of a layer around a place say of it.
     fn ask(&self, layer: usize, place: &Place) -> Answer {
-        let columns = self.azimuths.columns();
         let mut answer = Answer::default();
-        for step in 0..=2 * BESIDE {
-            let column = (place.column + columns + step - BESIDE) % columns;
+        for column in place.columns {
             let range_m = self.range_m[column * MAX_LAYERS + layer];
             if range_m.abs() > place.far_m {
                 answer.passed += 1;
@@ -171,9 +196,9 @@ impl Past {
     }
 }
 
-/// Where a place is: in which column, and nearer and farther by the margin.
+/// Where a place is: in which column and those beside it, and nearer and farther by the margin.
 struct Place {
-    column: usize,
+    columns: [usize; 3],
     near_m: f32,
     far_m: f32,
 }

@@ -59,6 +59,17 @@ impl Azimuths {
         self.columns
     }
 
+    /// The column so far from another one, where there is one: `turn_rad` clockwise from it.
+    pub fn column_beside(&self, column: usize, turn_rad: f64) -> Option<usize> {
+        let columns = self.columns as isize;
+        let beside = column as isize + libm::round(turn_rad / self.step_rad) as isize;
+        if self.sees_all_round {
+            Some(beside.rem_euclid(columns.max(1)) as usize)
+        } else {
+            (0..columns).contains(&beside).then_some(beside as usize)
+        }
+    }
+
     /// The column nearest to an azimuth, in radians clockwise from y.
     pub fn column_at(&self, azimuth_rad: f64) -> usize {
         let turn_rad = azimuth_rad - self.start_rad;

@@ -53,7 +53,10 @@ pub(super) fn seen_before(
     let [x, y, _] = scene.sweep.sensor.position_m;
     let z_m = attitude.place(&point_m).z;
     let at_m = Vector3::new(x + f64::from(at_m[0]), y + f64::from(at_m[1]), z_m);
-    scene.beams.seen(scene.sweep.epoch, &at_m, is_own)
+    let azimuth_rad = scene.scan.azimuth_rad(scene.scan.column(point as usize));
+    scene
+        .beams
+        .seen(scene.sweep.epoch, &at_m, azimuth_rad, is_own)
 }
 
 /// Where spots are, relative to where the sensor is at the end of the sweep.
