@@ -17,7 +17,8 @@ const FAST_MPS: f64 = 1.5;
 /// Of what is structure for sure motion says nothing, if it is as long as this: shorter ones are
 /// seen whole.
 const LONG_M: f64 = 2.5;
-/// Share of returns in places that were empty from which on something moved there: fitted by scripts/fit-newness.
+/// Share of returns in places that were empty from which on something moved there: set by hand on the
+/// recordings of people indoors, of a yard and of traffic.
 const LEAST_NEW: f64 = 0.6;
 /// The same below which what was thought to move stands.
 const LEAST_MOVED: f64 = 0.2;
