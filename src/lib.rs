@@ -56,6 +56,9 @@ pub mod config;
 // How a stage declares its parameters: unit, range, two profiles.
 pub mod parameter;
 
+// What the pipeline says of a revolution.
+mod report;
+
 // Why an envelope was of no use.
 mod fault;
 

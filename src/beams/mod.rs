@@ -4,7 +4,7 @@
 //! (Yoon et al. 2019; Dynablox, Schmid et al. 2023, of which this is the form for a sensor of few layers: a place is
 //! looked up in whole revolutions of the past instead of in voxels, of which its rays would meet one in ten).
 
-mod past;
+mod range_image;
 
 use nalgebra::Vector3;
 
@@ -12,7 +12,7 @@ use crate::cloud::Scan;
 use crate::ego::{Placement, Sweep, wrapped_rad};
 use crate::geometry::Rectangle;
 use crate::time::{Span, Time};
-use past::Past;
+use range_image::RangeImage;
 
 /// What is known of a place in the past.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -30,7 +30,7 @@ pub enum Seen {
 #[derive(Debug, Clone, Default)]
 pub struct Beams {
     /// The oldest first.
-    pasts: Vec<Past>,
+    images: Vec<RangeImage>,
     epoch: u32,
     kept_at: Option<Time>,
     /// How far the sensor turned in the last sweep, and whether it turned as far in the one before.
@@ -42,7 +42,7 @@ pub struct Beams {
 
 /// How many revolutions are remembered, and one in how long: somebody who walks slowly goes his own depth in the one, and
 /// a lorry that turns goes its own length in all.
-pub const MOST_PASTS: usize = 4;
+pub const MOST_IMAGES: usize = 4;
 const APART: Span = Span::from_micros(480_000);
 /// A sensor whose turn in a sweep differs by more than this from that in the one before was jerked meanwhile, and nobody
 /// knows when: what is 40 m away may be placed a metre off.
@@ -51,7 +51,7 @@ const STEADY_RAD: f64 = 0.025;
 impl Beams {
     /// Forgets everything.
     pub fn reset(&mut self) {
-        self.pasts.iter_mut().for_each(Past::forget);
+        self.images.iter_mut().for_each(RangeImage::forget);
         self.kept_at = None;
     }
 
@@ -82,19 +82,19 @@ impl Beams {
             return;
         }
         self.kept_at = Some(scan.time());
-        if self.pasts.len() < MOST_PASTS {
-            self.pasts.push(Past::default());
+        if self.images.len() < MOST_IMAGES {
+            self.images.push(RangeImage::default());
         } else {
-            self.pasts.rotate_left(1);
+            self.images.rotate_left(1);
         }
-        if let Some(past) = self.pasts.last_mut() {
-            past.take(scan, ground, moving, sweep, placements);
+        if let Some(image) = self.images.last_mut() {
+            image.take(scan, ground, moving, sweep, placements);
         }
     }
 
     /// Of the revolutions that are remembered, the oldest first.
     pub fn times(&self) -> impl Iterator<Item = Time> + use<'_> {
-        self.pasts.iter().map(Past::time)
+        self.images.iter().map(RangeImage::time)
     }
 
     /// What was seen of a place in the odometry frame, where the sensor now looks at an azimuth, as far back as it is known.
@@ -110,12 +110,12 @@ impl Beams {
         if epoch != self.epoch || !self.is_steady {
             return Seen::Unknown;
         }
-        let look = |past: &Past| past.seen(at_m, past.guess(azimuth_rad, self.yaw_rad));
-        for (number, past) in self.pasts.iter().enumerate() {
-            match look(past) {
+        let look = |image: &RangeImage| image.seen(at_m, image.guess(azimuth_rad, self.yaw_rad));
+        for (number, image) in self.images.iter().enumerate() {
+            match look(image) {
                 Seen::Empty => return Seen::Empty,
                 Seen::Occupied if !is_own(number) => {
-                    let is_left = self.pasts.last().map(look) == Some(Seen::Empty);
+                    let is_left = self.images.last().map(look) == Some(Seen::Empty);
                     return if is_left {
                         Seen::Unknown
                     } else {
@@ -230,8 +230,11 @@ mod tests {
     fn what_is_there_now_is_left_out_of_what_was_seen() {
         let beams = beams(&wall(), false, &Pose::SENSOR);
         let at_m = place(20.0, 20.0);
-        assert_eq!(beams.seen(0, &at_m, 0.3, |past| past == 0), Seen::Unknown);
-        assert_eq!(beams.seen(0, &at_m, 0.3, |past| past == 1), Seen::Occupied);
+        assert_eq!(beams.seen(0, &at_m, 0.3, |image| image == 0), Seen::Unknown);
+        assert_eq!(
+            beams.seen(0, &at_m, 0.3, |image| image == 1),
+            Seen::Occupied
+        );
     }
 
     #[test]
@@ -304,7 +307,7 @@ mod tests {
             .times()
             .map(|time| (time - scan.time()).seconds())
             .collect();
-        assert_eq!(times.len(), MOST_PASTS);
+        assert_eq!(times.len(), MOST_IMAGES);
         assert!(
             times
                 .windows(2)

@@ -59,10 +59,15 @@ impl Azimuths {
         self.columns
     }
 
-    /// The column so far from another one, where there is one: `turn_rad` clockwise from it.
-    pub fn column_beside(&self, column: usize, turn_rad: f64) -> Option<usize> {
+    /// Between two columns, in radians clockwise.
+    pub fn step_rad(&self) -> f64 {
+        self.step_rad
+    }
+
+    /// The column so many after another one, where there is one.
+    pub fn column_beside(&self, column: usize, after: isize) -> Option<usize> {
         let columns = self.columns as isize;
-        let beside = column as isize + libm::round(turn_rad / self.step_rad) as isize;
+        let beside = column as isize + after;
         if self.sees_all_round {
             Some(beside.rem_euclid(columns.max(1)) as usize)
         } else {

@@ -7,14 +7,7 @@
 use std::ops::RangeInclusive;
 
 use super::Class;
-
-/// The road users that are told apart, in the order of [`Belief`].
-const ROAD_USERS: [Class; 4] = [
-    Class::Car,
-    Class::Cyclist,
-    Class::Pedestrian,
-    Class::LargeVehicle,
-];
+use super::profiles::{PROFILES, ROAD_USERS, Within};
 
 /// What was measured of an object over its life.
 #[derive(Debug, Clone, Copy)]
@@ -85,103 +78,6 @@ impl Qualities {
         }
     }
 }
-
-/// No single quality decides alone.
-const WORST_LOG: f64 = -8.0;
-/// What is too fast for a bicycle has a motor.
-const MOTOR_LOG: f64 = -2.0;
-
-/// An interval with the standard deviation outside of it.
-struct Within(f64, f64, f64);
-
-impl Within {
-    /// Logarithm of the relative probability of a value.
-    fn log(&self, value: f64) -> f64 {
-        self.log_between(value, value)
-    }
-
-    /// The same for a value that lies somewhere between two bounds.
-    fn log_between(&self, low: f64, high: f64) -> f64 {
-        let Self(from, to, deviation) = *self;
-        let off = (from - high).max(low - to).max(0.0) / deviation;
-        (-0.5 * off * off).max(WORST_LOG)
-    }
-}
-
-/// What is known of a class of road users: sides, top, speed, and how frequent it is.
-struct Profile {
-    long_m: Within,
-    short_m: Within,
-    whole_m: Within,
-    wide_m: Within,
-    across_m: Within,
-    upper_m: Within,
-    top_m: Within,
-    speed_mps: Within,
-    /// Logarithm of the probability that is left of it at least, however much faster it moves.
-    faster_log: f64,
-    /// Least that the longer side of what is seen may be while it moves: it may be seen from an end.
-    end_on_m: f64,
-    log_prior: f64,
-}
-
-/// In the order of [`ROAD_USERS`]. Lengths and widths: cars from the smallest to vans, and for a
-/// rear that is all one sees; bicycles with their riders (FGSV, RASt 2006: 1.9 m by 0.8 m at
-/// most); people; lorries and buses up to an articulated one (16.5 m, Directive 96/53/EC).
-const PROFILES: [Profile; 4] = [
-    Profile {
-        long_m: Within(1.35, 5.3, 0.2),
-        short_m: Within(0.1, 2.1, 0.15),
-        whole_m: Within(3.1, 5.3, 0.3),
-        wide_m: Within(1.2, 2.15, 0.15),
-        across_m: Within(0.1, 2.15, 0.15),
-        upper_m: Within(0.95, 5.3, 0.12),
-        top_m: Within(1.25, 2.1, 0.12),
-        speed_mps: Within(0.0, 40.0, 2.0),
-        faster_log: WORST_LOG,
-        end_on_m: 1.35,
-        log_prior: -0.7,
-    },
-    Profile {
-        long_m: Within(0.95, 1.95, 0.14),
-        short_m: Within(0.1, 0.85, 0.12),
-        whole_m: Within(0.3, 1.95, 0.15),
-        wide_m: Within(0.1, 0.95, 0.12),
-        across_m: Within(0.1, 0.85, 0.12),
-        upper_m: Within(0.1, 0.95, 0.12),
-        top_m: Within(1.4, 1.95, 0.12),
-        speed_mps: Within(1.9, 8.5, 0.45),
-        faster_log: MOTOR_LOG,
-        end_on_m: 0.4,
-        log_prior: -1.6,
-    },
-    Profile {
-        long_m: Within(0.2, 0.85, 0.09),
-        short_m: Within(0.05, 0.7, 0.1),
-        whole_m: Within(0.1, 0.95, 0.12),
-        wide_m: Within(0.1, 0.95, 0.12),
-        across_m: Within(0.1, 0.85, 0.1),
-        upper_m: Within(0.1, 0.85, 0.1),
-        top_m: Within(1.3, 1.95, 0.12),
-        speed_mps: Within(0.0, 2.3, 0.35),
-        faster_log: WORST_LOG,
-        end_on_m: 0.2,
-        log_prior: -1.6,
-    },
-    Profile {
-        long_m: Within(5.0, 16.5, 1.1),
-        short_m: Within(0.1, 2.8, 0.2),
-        whole_m: Within(5.0, 18.0, 0.5),
-        wide_m: Within(1.5, 2.8, 0.2),
-        across_m: Within(0.1, 2.8, 0.2),
-        upper_m: Within(1.3, 18.0, 0.2),
-        top_m: Within(2.3, 4.0, 0.12),
-        speed_mps: Within(0.0, 30.0, 2.0),
-        faster_log: WORST_LOG,
-        end_on_m: 1.7,
-        log_prior: -1.3,
-    },
-];
 
 /// What moves and looks like no class is a road user all the same; what stands and does so is none.
 const OTHER_LOG_PRIOR: f64 = -12.0;
@@ -445,7 +341,6 @@ mod tests {
             top_below_m: 1.9,
             speed_mps: 1.4,
             moved: true,
-            surely_moves: false,
             ..CAR
         };
         let rider = Qualities {
@@ -488,7 +383,6 @@ mod tests {
             across_m: Some(1.7),
             speed_mps: 14.0,
             moved: true,
-            surely_moves: false,
             points: 8,
             ..CAR
         };
@@ -512,7 +406,6 @@ mod tests {
             top_below_m: 4.1,
             speed_mps: 22.0,
             moved: true,
-            surely_moves: false,
             points: 9000,
             ..CAR
         };
@@ -536,14 +429,12 @@ mod tests {
             wide_m: Some(2.0),
             speed_mps: 4.0,
             moved: true,
-            surely_moves: false,
             points: 740,
             ..CAR
         };
         let wall = Qualities {
             speed_mps: 0.0,
             moved: false,
-            surely_moves: false,
             ..van
         };
         let [van, wall] = [van, wall].map(|qualities| Belief::of(&qualities));
@@ -561,7 +452,6 @@ mod tests {
             top_below_m: 2.1,
             speed_mps: 14.0,
             moved: true,
-            surely_moves: false,
             points: 15,
             ..CAR
         };
@@ -583,7 +473,6 @@ mod tests {
             top_below_m: 2.0,
             speed_mps: 1.4,
             moved: true,
-            surely_moves: false,
             points: 50,
             ..CAR
         };

@@ -6,7 +6,7 @@ use super::Scene;
 use super::nearby::Discs;
 use super::patches::Patch;
 use super::road_user::Track;
-use crate::beams::MOST_PASTS;
+use crate::beams::MOST_IMAGES;
 use crate::geometry::{Outline, Rectangle};
 
 /// Where a track is expected.
@@ -20,7 +20,7 @@ pub(super) struct Forecast {
     /// Of late it was where nothing was before: what was there before is none of it.
     pub(super) is_new: bool,
     /// Of what moves, or seems to, where it was in the revolutions that the beams remember, from where it is now.
-    pub(super) from_m: [Option<[f32; 2]>; MOST_PASTS],
+    pub(super) from_m: [Option<[f32; 2]>; MOST_IMAGES],
     /// Nothing of it is looked at.
     pub(super) rests: bool,
 }
@@ -34,7 +34,7 @@ const LEAST_WAY_M: f64 = 0.3;
 
 impl Forecast {
     fn of(track: &Track, place: &Rectangle, middle_m: [f32; 2], scene: &Scene<'_>) -> Self {
-        let mut from_m = [None; MOST_PASTS];
+        let mut from_m = [None; MOST_IMAGES];
         for (from_m, time) in from_m.iter_mut().zip(scene.beams.times()) {
             // The rays of its column passed over it as much earlier than the end of that sweep as of this one.
             let seen_at = time + (track.time() - scene.scan.time());
@@ -60,23 +60,27 @@ impl Forecast {
     }
 
     /// Whether the track may have been in a place in a revolution that the beams remember.
-    pub(super) fn reached(&self, at_m: [f32; 2], past: usize) -> bool {
-        self.from_m[past].is_some_and(|from_m| {
-            let off_m = [0, 1].map(|axis| at_m[axis] - from_m[axis] - self.middle_m[axis]);
-            self.outline.off_edge_m(off_m) <= self.margin_m
+    pub(super) fn reached(&self, at_m: [f32; 2], image: usize) -> bool {
+        self.from_m[image].is_some_and(|from_m| {
+            let at_m = [0, 1].map(|axis| at_m[axis] - from_m[axis]);
+            self.reaches(at_m)
         })
     }
 
     /// Whether a place, in the frame of the patches, is within the track's box.
     pub(super) fn holds(&self, at_m: [f32; 2]) -> bool {
-        let off_m = [0, 1].map(|axis| at_m[axis] - self.middle_m[axis]);
-        self.outline.off_edge_m(off_m) <= 0.0
+        self.off_edge_m(at_m) <= 0.0
     }
 
     /// Whether a place, in the frame of the patches, can be of the track.
     pub(super) fn reaches(&self, at_m: [f32; 2]) -> bool {
+        self.off_edge_m(at_m) <= self.margin_m
+    }
+
+    /// How far out of the track's box a place is.
+    fn off_edge_m(&self, at_m: [f32; 2]) -> f32 {
         let off_m = [0, 1].map(|axis| at_m[axis] - self.middle_m[axis]);
-        self.outline.off_edge_m(off_m) <= self.margin_m
+        self.outline.off_edge_m(off_m)
     }
 }
 

@@ -51,6 +51,8 @@ mod people;
 
 mod placing;
 
+mod profiles;
+
 mod road_user;
 
 mod seam;

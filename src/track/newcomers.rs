@@ -1,7 +1,7 @@
 //! What stands before something else, or at it, and was not there before: returns in places that were empty are
 //! parted from those in places where something was.
 
-use super::placing::Placed;
+use super::placing::{Placed, distance_m};
 use crate::beams::Seen;
 use crate::cloud::Scan;
 use crate::partition::Partition;
@@ -33,7 +33,7 @@ const APART: f32 = 0.02;
 /// Returns of which the place is not known belong to what is new as near as this.
 const BESIDE_M: f32 = 0.3;
 /// Returns in empty places that make a thing.
-pub(super) const FEWEST: usize = 4;
+const FEWEST: usize = 4;
 /// Share of known returns from which on all of them are new.
 const WHOLE: f64 = 0.8;
 /// What is met above something that was there before, as near to it as this, is a part of it that rays went through: a
@@ -42,16 +42,23 @@ const ABOVE_M: f32 = 0.5;
 const REST: u32 = u32::MAX;
 
 /// How many returns are in places that were empty, and in which something was.
-pub(super) fn known(placed: &[Placed]) -> [usize; 2] {
+fn known(placed: &[Placed]) -> [usize; 2] {
     [Seen::Empty, Seen::Occupied].map(|seen| {
         let of = placed.iter().filter(|placed| placed.before == seen);
         of.count()
     })
 }
 
-fn distance_m(one: &Placed, other: &Placed) -> f32 {
-    let [x, y] = [0, 1].map(|axis| one.at_m[axis] - other.at_m[axis]);
-    (x * x + y * y).sqrt()
+/// What was seen before of most of the places of which it is known.
+pub(super) fn most(placed: &[Placed]) -> Seen {
+    let [new, old] = known(placed);
+    if new > old && new >= FEWEST {
+        Seen::Empty
+    } else if old > new && old >= FEWEST {
+        Seen::Occupied
+    } else {
+        Seen::Unknown
+    }
 }
 
 impl Counts {
@@ -122,7 +129,7 @@ impl Newcomers {
                 last = Some((column_of(own), *thing));
                 counts.columns += 1;
                 let is_carried = below.is_some_and(|below| {
-                    column_of(below) == column_of(own) && distance_m(below, own) < ABOVE_M
+                    column_of(below) == column_of(own) && distance_m(below.at_m, own.at_m) < ABOVE_M
                 });
                 counts.carried += usize::from(is_carried);
             }
@@ -154,7 +161,7 @@ impl Newcomers {
                     (Seen::Empty, Seen::Unknown) | (Seen::Unknown, Seen::Empty) => BESIDE_M,
                     _ => continue,
                 };
-                if distance_m(one, other) < within_m {
+                if distance_m(one.at_m, other.at_m) < within_m {
                     self.partition.join(number as u32, other_number as u32);
                 }
             }

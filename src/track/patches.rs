@@ -8,6 +8,7 @@ use super::placing::{Bounds, Placed, Placing};
 use super::spots::seen_before;
 use super::thinning::Thinning;
 use super::{Scene, TrackParameters, people};
+use crate::beams::Seen;
 use crate::cluster::Clusters;
 
 /// A cluster, or a part of one.
@@ -22,10 +23,8 @@ pub(super) struct Patch {
     goes_on: bool,
     /// It was cut off something that is no road user, and may be a piece of that.
     pub(super) is_suspect: bool,
-    /// It is where nothing was before.
-    pub(super) is_new: bool,
-    /// It is where something was before.
-    pub(super) is_old: bool,
+    /// What was seen before of the places of most of it.
+    pub(super) before: Seen,
     /// How many returns each of its own stands for, on average.
     pub(super) returns_each: f32,
     /// One of several people: their patches follow each other, so many before this one and after.
@@ -118,8 +117,7 @@ impl Placer {
                 bounds,
                 goes_on: false,
                 is_suspect: false,
-                is_new: false,
-                is_old: false,
+                before: Seen::Unknown,
                 returns_each,
                 beside: [0; 2],
             };
@@ -148,8 +146,8 @@ impl Placer {
             self.near.retain(|track| forecasts.of(*track).moves());
             for placed in &mut self.placed[patch.begin..patch.end] {
                 let at_m = placed.at_m;
-                placed.before = seen_before(scene, placed.point, at_m, |past| {
-                    let was_there = |track: &usize| forecasts.of(*track).reached(at_m, past);
+                placed.before = seen_before(scene, placed.point, at_m, |image| {
+                    let was_there = |track: &usize| forecasts.of(*track).reached(at_m, image);
                     self.near.iter().any(was_there)
                 });
             }
@@ -179,24 +177,21 @@ impl Placer {
                     bounds: Bounds::of(&self.placed[begin..end]),
                     goes_on: false,
                     is_suspect: false,
-                    is_new: true,
-                    is_old: false,
+                    before: Seen::Empty,
                     ..*patch
                 });
                 begin = end;
             }
             let rest = &self.placed[begin..patch.end];
             if begin == patch.begin {
-                let [new, old] = newcomers::known(rest);
                 self.patches.push(Patch {
-                    is_new: new > old && new >= newcomers::FEWEST,
-                    is_old: old > new && old >= newcomers::FEWEST,
+                    before: newcomers::most(rest),
                     ..*patch
                 });
             } else if !rest.is_empty() {
                 self.patches.push(Patch {
                     begin,
-                    is_old: true,
+                    before: Seen::Occupied,
                     bounds: Bounds {
                         top_m: patch.bounds.top_m,
                         ..Bounds::of(rest)
@@ -266,8 +261,7 @@ impl Placer {
                     bounds,
                     goes_on: is_too_tall && goes_on,
                     is_suspect: false,
-                    is_new: false,
-                    is_old: false,
+                    before: Seen::Unknown,
                     returns_each: 1.0,
                     beside: [0; 2],
                 });

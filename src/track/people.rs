@@ -1,6 +1,6 @@
 //! People side by side: a cluster cannot tell their shoulders apart, but shows their heads.
 
-use super::placing::{Bounds, Placed};
+use super::placing::{Bounds, Placed, distance_m};
 use crate::cloud::Scan;
 
 /// Heads are higher than this, and what is below it in a car are screens and seats.
@@ -142,11 +142,6 @@ fn heads(placed: &[Placed], scan: &Scan) -> Option<Heads> {
         }
     }
     Some(heads)
-}
-
-fn distance_m(from_m: [f32; 2], to_m: [f32; 2]) -> f32 {
-    let [x, y] = [0, 1].map(|axis| to_m[axis] - from_m[axis]);
-    (x * x + y * y).sqrt()
 }
 
 #[cfg(test)]

@@ -50,6 +50,12 @@ pub(super) struct Placed {
     pub(super) before: Seen,
 }
 
+/// How far apart two places are.
+pub(super) fn distance_m(from_m: [f32; 2], to_m: [f32; 2]) -> f32 {
+    let [x, y] = [0, 1].map(|axis| to_m[axis] - from_m[axis]);
+    (x * x + y * y).sqrt()
+}
+
 /// The box that holds some returns.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bounds {

@@ -15,6 +15,7 @@ use super::road_user::Track;
 use super::spots::{Spot, bounds_m, places_m};
 use super::strays::Strays;
 use super::{Scene, TrackParameters, seam};
+use crate::beams::Seen;
 use crate::cluster::Clusters;
 use crate::geometry::Extent;
 use crate::time::Time;
@@ -140,8 +141,9 @@ impl Grouping {
             }
             let begin = self.spots.len();
             let placed = self.placer.placed(&patch);
+            let is_old = patch.before == Seen::Occupied;
             self.claims
-                .settle(placed, &self.near, &self.forecasts, is_whole, patch.is_old);
+                .settle(placed, &self.near, &self.forecasts, is_whole, is_old);
             if patch.is_one_of_several() {
                 let owners = self.claims.owners().flatten();
                 let people = owners.filter(|track| !tracks[*track].is_vehicle());
@@ -151,7 +153,7 @@ impl Grouping {
             let owner = is_whole
                 .then(|| self.owner(&patch, tracks, scene.scan.time()))
                 .flatten()
-                .filter(|(track, _)| !(patch.is_old && self.forecasts.of(*track).is_new));
+                .filter(|(track, _)| !(is_old && self.forecasts.of(*track).is_new));
             let owns = owner.map(|(track, _)| track);
             if is_whole {
                 self.count_things(&patch, owns, tracks);
@@ -200,7 +202,7 @@ impl Grouping {
                 tracks[*track].is_vehicle() || forecasts.is_nearest(*track, patches, number)
             });
         }
-        if patch.is_new {
+        if patch.before == Seen::Empty {
             // It is before what stands there, and none of it.
             self.near.retain(|track| !tracks[*track].is_background());
         }

@@ -17,15 +17,6 @@ const FAST_MPS: f64 = 1.5;
 /// Of what is structure for sure motion says nothing, if it is as long as this: shorter ones are
 /// seen whole.
 const LONG_M: f64 = 2.5;
-/// Share of returns in places that were empty from which on something moved there: set by hand on the
-/// recordings of people indoors, of a yard and of traffic.
-const LEAST_NEW: f64 = 0.6;
-/// The same below which what was thought to move stands.
-const LEAST_MOVED: f64 = 0.2;
-/// Share of its returns in places where something else was from which on it stands, however it seems to go, unless it is
-/// known to have gone so far.
-const MOST_OLD: f64 = 0.5;
-const SURE_WAY_M: f64 = 5.0;
 /// How much higher than known something may be where a ray passes far away.
 const HIGHER_M: f64 = 0.4;
 
@@ -74,8 +65,7 @@ impl Track {
             let known_m = self.lower_m.get_or_insert(fresh_m);
             *known_m += 0.2 * (fresh_m - *known_m);
         }
-        self.new += 0.2 * (look.new - self.new);
-        self.old += 0.2 * (look.old - self.old);
+        self.newness.learn(look, self.usual_points);
         self.trace.push(seen_at, self.motion.estimate().position_m);
         self.note_motion(look);
         self.is_carried = self.goes_like_a_rail(look, spots);
@@ -148,25 +138,22 @@ impl Track {
             self.born_m = estimate.position_m;
             return;
         }
-        let is_old = self.newness().is_some_and(|newness| newness < LEAST_MOVED);
-        if is_old {
-            self.new_way_m *= 0.8;
-        }
-        let is_much = self.new_way_m < SURE_WAY_M && self.old > MOST_OLD * self.usual_points;
-        if self.moves && is_old && (is_much || estimate.standing > 0.5) {
-            // It clings to something that stood there before it came.
-            (self.moves, self.travelled_m, self.new_way_m) = (false, 0.0, 0.0);
-            (self.born_m, self.new_from_m) = (estimate.position_m, None);
+        if self.moves
+            && self
+                .newness
+                .clings(estimate.standing > 0.5, self.usual_points)
+        {
+            (self.moves, self.travelled_m) = (false, 0.0);
+            self.born_m = estimate.position_m;
+            self.newness.forget_way();
         }
         let speed_mps = estimate.velocity_mps.norm();
         let is_moving = estimate.standing < 0.1 && speed_mps > MOVING_MPS;
-        let is_new = self.newness().is_none_or(|newness| newness > LEAST_NEW);
-        if is_moving && is_new && self.trails.shows_motion(self.shape.seen_m[0], look) {
+        let may_move = self.newness.allows_motion(self.usual_points);
+        if is_moving && may_move && self.trails.shows_motion(self.shape.seen_m[0], look) {
             self.moves = true;
-            if self.is_new() {
-                let from_m = *self.new_from_m.get_or_insert(estimate.position_m);
-                self.new_way_m = self.new_way_m.max((estimate.position_m - from_m).norm());
-            }
+            self.newness
+                .note_way(estimate.position_m, self.usual_points);
             let travelled_m = (estimate.position_m - self.born_m).norm();
             self.travelled_m = self.travelled_m.max(travelled_m);
         }
@@ -180,27 +167,14 @@ impl Track {
         }
     }
 
-    /// The share of its returns of late, of those whose place was seen before, whose place was empty; `None` where too few
-    /// tell.
-    pub(in crate::track) fn newness(&self) -> Option<f64> {
-        /// Returns, and share of them.
-        const FEWEST: f64 = 2.0;
-        const LEAST_SHARE: f64 = 0.1;
-        let known = self.new + self.old;
-        (known >= FEWEST.max(LEAST_SHARE * self.usual_points)).then(|| self.new / known)
-    }
-
     /// Whether it was of late where nothing was before.
     pub(in crate::track) fn is_new(&self) -> bool {
-        self.newness().is_some_and(|newness| newness > LEAST_NEW)
+        self.newness.was_empty(self.usual_points)
     }
 
     /// Whether it moves for sure, or did and went far: as a whole, and to where nothing was.
     fn surely_moves(&self) -> bool {
-        const LEAST_WAY_M: f64 = 0.1;
-        const FAR_M: f64 = 1.5;
-        let stands = self.motion.standing() > 0.5;
-        self.moves && self.new_way_m > if stands { FAR_M } else { LEAST_WAY_M }
+        self.moves && self.newness.went(self.motion.standing() > 0.5)
     }
 
     /// Whether it goes with the sensor as what is met of a rail does: a layer meets it at one

@@ -2,7 +2,11 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+mod gating;
+
 mod measured;
+
+mod newness;
 
 mod published;
 
@@ -15,7 +19,7 @@ use super::belief::Belief;
 use super::existence::Existence;
 use super::look::Look;
 use super::motion::Motion;
-use super::shape::{Shape, is_tall};
+use super::shape::Shape;
 use super::sight::Sight;
 use super::spots::Spot;
 use super::trace::Trace;
@@ -23,24 +27,15 @@ use super::trail::Trails;
 use super::view::View;
 use crate::geometry::Rectangle;
 use crate::time::{Span, Time};
+use newness::Newness;
 use reunion::Parting;
 
 /// Standard deviation of the velocity of something seen for the first time, and of a vehicle: who
 /// comes at 100 km/h is two of them fast.
 const BIRTH_MPS: f64 = 6.0;
 const VEHICLE_BIRTH_MPS: f64 = 14.0;
-/// Noise of a box's middle beside that of its edges, because its shape is not a box.
-const MIDDLE_M: f64 = 0.08;
-
-/// Variance of a direction from which on the hidden middle grows no more unsure: a box that may lie
-/// anywhere about what is seen has its middle within half a length of it all the same.
-const MOST_YAW_VARIANCE: f64 = 0.09;
-
 /// Probability of a road user below which something is structure for sure.
 const SURELY_NONE: f64 = 0.05;
-
-/// Length of the longest lorries with their trailers (Directive 96/53/EC).
-const LONGEST_M: f64 = 18.75;
 
 /// Returns below which an object may be no cluster in the next revolution.
 const SPARSE: usize = 16;
@@ -77,12 +72,7 @@ pub(super) struct Track {
     /// Whether it was seen to move, and how far.
     moves: bool,
     travelled_m: f64,
-    /// Returns of late whose place was seen empty before, and something in it.
-    new: f64,
-    old: f64,
-    /// Where it was when it was first seen to move to where nothing was, and how far it went from there.
-    new_from_m: Option<Vector2<f64>>,
-    new_way_m: f64,
+    newness: Newness,
     /// Whether its motion may be the sensor's.
     is_carried: bool,
     is_suspect: bool,
@@ -135,10 +125,7 @@ impl Track {
             speed_mps: 0.0,
             moves: false,
             travelled_m: 0.0,
-            new: look.new,
-            old: look.old,
-            new_from_m: None,
-            new_way_m: 0.0,
+            newness: Newness::of(look),
             is_carried: false,
             is_suspect,
             is_cut: look.is_cut != [false; 2],
@@ -299,65 +286,6 @@ impl Track {
         self.existence.odds()
     }
 
-    /// Longest extent that more of the same object may have, if that is so high.
-    pub(super) fn most_m(&self, top_m: f64) -> [f64; 2] {
-        let [length_m, width_m] = self.shape.size_m(self.belief.vehicle());
-        let growth_m = if self.is_confirmed() { 0.6 } else { 2.0 };
-        if self.may_be_lorry(top_m) {
-            let askew_m = LONGEST_M * libm::sqrt(self.shape.yaw_variance);
-            return [LONGEST_M, width_m + 0.4 + askew_m.min(1.0)];
-        }
-        [length_m + growth_m, width_m + 0.4]
-    }
-
-    /// Whether it and something so high may both be parts of a lorry.
-    fn may_be_lorry(&self, top_m: f64) -> bool {
-        // What is hardly a road user would grow over all that stands around it.
-        self.is_moving_vehicle()
-            && self.belief.road_user() > 0.5
-            && self.shape.is_tall()
-            && is_tall(top_m)
-    }
-
-    fn centre(&self, view: &View, expected_m: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
-        let vehicle = self.belief.vehicle();
-        let (centre_m, noise) = view.centre(
-            self.shape.size_m(vehicle),
-            self.shape.size_deviation_m(vehicle),
-            expected_m,
-            self.shape.yaw_variance.min(MOST_YAW_VARIANCE),
-            self.is_moving_vehicle(),
-        );
-        (centre_m, noise + Matrix2::identity() * MIDDLE_M * MIDDLE_M)
-    }
-
-    /// How unlikely it is that a group is this object: the squared Mahalanobis distance of its
-    /// place, with a price for a spread that would take anything and for a size that does not fit.
-    pub(super) fn cost(&self, spots: &[Spot], look: &Look) -> f64 {
-        let view = View::of(look, spots, self.shape.yaw_rad);
-        let estimate = self.motion.estimate();
-        let (centre_m, noise) = self.centre(&view, estimate.position_m);
-        let spread = estimate.position_covariance + noise;
-        let off = centre_m - estimate.position_m;
-        let Some(inverse) = spread.try_inverse() else {
-            return f64::MAX;
-        };
-        let squared = (off.transpose() * inverse * off)[0];
-        let most = self.most_m(look.top_m);
-        let extent = view.extent_m();
-        let excess_m = (extent[0] - most[0]).max(extent[1] - most[1]).max(0.0);
-        let vanished = if self.is_confirmed() {
-            let ratio = (look.points as f64 + 3.0) / (self.points as f64 + 3.0);
-            libm::log(ratio).abs()
-        } else {
-            0.0
-        };
-        squared
-            + 0.5 * libm::log(spread.determinant().max(1e-6) / 0.01).max(0.0)
-            + 4.0 * excess_m
-            + 0.3 * vanished
-    }
-
     /// Whether it was seen wider than a car: it may be two of them that stand side by side.
     pub(super) fn is_wide(&self) -> bool {
         const WIDE_M: f64 = 2.0;
@@ -413,7 +341,7 @@ impl Track {
         self.shape.yaw_rad = crate::ego::wrapped_rad(self.shape.yaw_rad + turn_rad);
         self.trails.reframe(moved);
         self.trace.clear();
-        self.new_from_m = None;
+        self.newness.reframe();
         self.born_m = Vector2::from(moved(self.born_m.into()));
         self.parted.reframe((sine, cosine), moved);
         self.floor_z_m += rise_m;

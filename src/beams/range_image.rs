@@ -1,4 +1,4 @@
-//! One revolution of the past, as an image of ranges.
+//! One revolution of the past as a range image: columns by layers.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -10,7 +10,7 @@ use crate::time::Time;
 
 /// Ranges, and where the sensor was.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Past {
+pub(super) struct RangeImage {
     time: Time,
     azimuths: Azimuths,
     /// Negative on the ground, which a ray ends on without meeting anything; 0 where nothing is known, and not a number
@@ -40,7 +40,7 @@ const FEWEST_PASSED: u32 = 2;
 /// Part of the step between layers up to which what a ray met reaches up and down.
 const REACH: f64 = 1.3;
 
-impl Past {
+impl RangeImage {
     pub(super) fn forget(&mut self) {
         self.range_m.clear();
     }
@@ -131,13 +131,9 @@ impl Past {
         }
         let range_m = (square_m2 + from_m.z * from_m.z).sqrt();
         let margin_m = MARGIN_M + MARGIN * range_m;
-        let last = self.azimuths.columns() - 1;
+        let beside = |after| self.azimuths.column_beside(column, after).unwrap_or(column);
         let place = Place {
-            columns: [
-                if column == 0 { last } else { column - 1 },
-                column,
-                if column == last { 0 } else { column + 1 },
-            ],
+            columns: [-1, 0, 1].map(beside),
             near_m: (range_m - margin_m) as f32,
             far_m: (range_m + margin_m) as f32,
         };
@@ -171,7 +167,8 @@ impl Past {
             if ahead_m > 0.0 && aside.abs() < NEAR {
                 // The arc tangent, to 2e-6.
                 let turn_rad = aside - aside * aside * aside / 3.0;
-                let column = self.azimuths.column_beside(column, turn_rad)?;
+                let after = libm::round(turn_rad / self.azimuths.step_rad()) as isize;
+                let column = self.azimuths.column_beside(column, after)?;
                 return Some((column, from_m));
             }
             column = self.azimuths.column_at(libm::atan2(from_m.x, from_m.y));
