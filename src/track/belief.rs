@@ -332,6 +332,31 @@ mod tests {
     };
 
     #[test]
+    fn what_surely_moves_is_a_road_user_of_no_class_if_it_looks_like_none() {
+        let with_a_load = Qualities {
+            long_m: 1.1,
+            short_m: 0.8,
+            upper_m: Some(1.1),
+            top_m: 2.4,
+            top_below_m: 2.5,
+            speed_mps: 1.3,
+            ..CAR
+        };
+        let moving = Qualities {
+            moved: true,
+            surely_moves: true,
+            ..with_a_load
+        };
+        let [stands, moves] = [with_a_load, moving].map(|qualities| Belief::of(&qualities));
+        assert!(stands.road_user() < 0.1, "{stands:?}");
+        assert!(moves.road_user() > 0.7, "{moves:?}");
+        assert!(
+            !matches!(moves.class().0, Class::Car | Class::Cyclist),
+            "{moves:?}"
+        );
+    }
+
+    #[test]
     fn everyday_road_users_are_told_apart() {
         let walker = Qualities {
             long_m: 0.6,

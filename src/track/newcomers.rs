@@ -172,22 +172,28 @@ impl Newcomers {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cloud::MAX_LAYERS;
     use crate::cloud::tests::scan_of;
 
     const COLUMNS: usize = 1800;
 
+    fn at(scan: &Scan, column: usize, layer: usize) -> Placed {
+        let point = column * MAX_LAYERS + layer;
+        let [x, y, z] = scan.point_m(point);
+        Placed {
+            at_m: [x, y],
+            above_m: z + 1.9,
+            point: point as u32,
+            is_brought: false,
+            before: Seen::Unknown,
+        }
+    }
+
     /// Returns of layer 8 in so many columns, and what was seen of their places.
     fn returns(scan: &Scan, columns: usize, before: impl Fn(usize) -> Seen) -> Vec<Placed> {
-        let placed = (0..columns).map(|column| {
-            let point = column * crate::cloud::MAX_LAYERS + 8;
-            let [x, y, z] = scan.point_m(point);
-            Placed {
-                at_m: [x, y],
-                above_m: z + 1.9,
-                point: point as u32,
-                is_brought: false,
-                before: before(column),
-            }
+        let placed = (0..columns).map(|column| Placed {
+            before: before(column),
+            ..at(scan, column, 8)
         });
         placed.collect()
     }
@@ -223,7 +229,7 @@ mod tests {
         let columns = |placed: &[Placed]| -> Vec<usize> {
             placed
                 .iter()
-                .map(|placed| placed.point as usize / 16)
+                .map(|placed| placed.point as usize / MAX_LAYERS)
                 .collect()
         };
         assert_eq!(columns(&placed[..6]), (20..26).collect::<Vec<_>>());
@@ -240,6 +246,51 @@ mod tests {
             _ => Seen::Occupied,
         });
         assert_eq!(ends, [6]);
+    }
+
+    #[test]
+    fn what_is_met_above_what_was_there_before_is_a_part_of_it() {
+        // A parked car's door of ten columns with panes, through which rays went, and a person who came beside it.
+        let scan = scan_of(COLUMNS, |column, _| u16::from(column < 30) * 1000);
+        let part = |layers: std::ops::Range<usize>, is_pane: fn(usize, usize) -> bool| {
+            let mut placed: Vec<Placed> = (0..30)
+                .flat_map(|column| layers.clone().map(move |layer| (column, layer)))
+                .map(|(column, layer)| Placed {
+                    before: if is_pane(column, layer) {
+                        Seen::Empty
+                    } else {
+                        Seen::Occupied
+                    },
+                    ..at(&scan, column, layer)
+                })
+                .collect();
+            let mut ends = vec![];
+            Newcomers::default().part(&mut placed, &scan, |_| false, &mut ends);
+            ends
+        };
+        assert_eq!(part(4..8, |column, layer| column < 10 && layer > 5), [0; 0]);
+        assert_eq!(part(4..8, |column, _| column < 10), [40]);
+    }
+
+    #[test]
+    fn what_is_within_something_that_moves_is_of_that() {
+        let scan = scan_of(COLUMNS, |column, _| u16::from(column < 100) * 1000);
+        let is_end = |column: usize| column < 6 || (60..66).contains(&column);
+        let seen = |column| {
+            if is_end(column) {
+                Seen::Empty
+            } else {
+                Seen::Occupied
+            }
+        };
+        let ends = |is_moving: fn(&Placed) -> bool| {
+            let (mut placed, mut ends) = (returns(&scan, 100, seen), vec![]);
+            Newcomers::default().part(&mut placed, &scan, is_moving, &mut ends);
+            ends
+        };
+        assert_eq!(ends(|_| false), [6, 12]);
+        let is_lorry = |placed: &Placed| (placed.point as usize) < 70 * MAX_LAYERS;
+        assert_eq!(ends(is_lorry), [70]);
     }
 
     #[test]
