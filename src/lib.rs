@@ -87,6 +87,10 @@ pub mod simulate;
 #[cfg(feature = "shell")]
 pub mod daemon;
 
+// The picture in a browser.
+#[cfg(feature = "shell")]
+pub mod view;
+
 // One file a command.
 #[cfg(feature = "shell")]
 pub mod cli;

@@ -297,6 +297,11 @@ impl Pipeline {
         &self.sweep
     }
 
+    /// How the points of each of its columns are placed in the odometry frame.
+    pub fn placements(&self) -> &[Placement] {
+        &self.placements
+    }
+
     /// How far the own vehicle is seen, if it is.
     pub fn own_vehicle(&self) -> Option<Extent> {
         self.own_vehicle.extent()

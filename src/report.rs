@@ -35,6 +35,22 @@ pub enum Step {
     Cluster,
     /// Clusters to objects.
     Track,
+    /// Static returns to the map.
+    Map,
+}
+
+impl Step {
+    /// A word for it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Cloud => "cloud",
+            Self::Ego => "ego",
+            Self::Ground => "ground",
+            Self::Cluster => "cluster",
+            Self::Track => "track",
+            Self::Map => "map",
+        }
+    }
 }
 
 /// What the steps say about a revolution.

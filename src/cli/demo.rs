@@ -1,17 +1,20 @@
 //! `kreisel demo`: everything on one machine, without any set-up.
 
 use std::io::{IsTerminal as _, Write as _};
-use std::net::Ipv4Addr;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::time::Duration;
 
 use anyhow::Result;
 use clap::Args;
 
+use super::run::serve_view;
 use super::{Completion, block_on, simulate, stop_signal};
 use crate::config::Configuration;
 use crate::daemon::session::{Datagram, Session};
 use crate::daemon::{self, Options};
+use crate::simulate::scenario::Scenario;
 use crate::track::Class;
+use crate::view::DEFAULT_ADDRESS;
 use crate::wire::object_list::{Object, ObjectList};
 use crate::wire::{Envelope, Message};
 
@@ -26,6 +29,12 @@ pub(super) struct Arguments {
     /// Noise of the simulated sensor follows from it.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// What to simulate; `kreisel simulate --list` names the scenarios.
+    #[arg(long, value_name = "NAME", default_value = "roundabout-waiting", value_parser = simulate::find)]
+    scenario: Scenario,
+    /// Where to show it in a browser.
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_value = DEFAULT_ADDRESS, default_missing_value = DEFAULT_ADDRESS)]
+    view: SocketAddr,
 }
 
 /// senderStamp of the demo's objects, to tell them from those of another daemon.
@@ -41,13 +50,20 @@ async fn demonstrate(arguments: &Arguments) -> Result<()> {
         cid: arguments.cid,
         interface: Some(Ipv4Addr::LOCALHOST),
     };
-    let roundabout = simulate::find("roundabout").map_err(anyhow::Error::msg)?;
     let configuration = Configuration::default();
     let sender = session.sender(&configuration.session)?;
+    // Without its view the demo is still worth watching.
+    let view = serve_view(arguments.view);
+    let view = view.inspect_err(|error| tracing::warn!("{error:#}")).ok();
+    let title = match &view {
+        Some(view) => format!("Open http://{} in a browser to see it.", view.address()),
+        None => "Its view could not be served; the log says why.".into(),
+    };
     let options = Options {
         session,
         sender_stamp: SENDER_STAMP,
         configuration,
+        view,
     };
     let duration = arguments.duration.map(Duration::from_secs_f64);
     let stop = async {
@@ -61,21 +77,21 @@ async fn demonstrate(arguments: &Arguments) -> Result<()> {
     };
     // Looking at the simulated world takes longer than perceiving it; nobody waits for that.
     let (ended, end) = tokio::sync::oneshot::channel();
-    let seed = arguments.seed;
+    let (scenario, seed) = (arguments.scenario, arguments.seed);
     std::thread::spawn(move || {
-        let sent = block_on(simulate::send(&roundabout, seed, 1.0, &sender));
+        let sent = block_on(simulate::send(&scenario, seed, 1.0, &sender));
         // Nobody listens when the demo is over.
         let _ = ended.send(sent);
     });
     tokio::select! {
         result = daemon::run(options, stop) => Ok(result?),
         Ok(result) = end => result,
-        result = show_objects(session) => result,
+        result = show_objects(session, &title) => result,
     }
 }
 
 /// Shows every list on a terminal, and one a second in a pipe.
-async fn show_objects(session: Session) -> Result<()> {
+async fn show_objects(session: Session, title: &str) -> Result<()> {
     let (mut receiver, _sender) = session.join(&Configuration::default().session)?;
     let mut datagram = Datagram::default();
     let terminal = std::io::stdout().is_terminal();
@@ -90,9 +106,11 @@ async fn show_objects(session: Session) -> Result<()> {
         };
         if ours && (terminal || list.revolution % 10 == 0) {
             let text = table(&list);
-            let clear = if terminal { "\x1b[H\x1b[2J" } else { "" };
             let mut out = std::io::stdout().lock();
-            write!(out, "{clear}{text}")?;
+            if terminal {
+                write!(out, "\x1b[H\x1b[2J{title}\n\n")?;
+            }
+            write!(out, "{text}")?;
             out.flush()?;
         }
     }

@@ -48,10 +48,13 @@ mod score;
 
 mod simulate;
 
+mod view;
+
 use std::net::Ipv4Addr;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
+use tracing::Level;
 
 use crate::daemon::session::Session;
 
@@ -61,7 +64,7 @@ use crate::daemon::session::Session;
 struct CommandLine {
     #[command(subcommand)]
     command: Command,
-    /// Say more: every message and every revolution.
+    /// Say more: 1, what is around, once a second; 2, every message and every revolution.
     #[arg(long, global = true, num_args = 0..=1, require_equals = true, default_missing_value = "1", value_name = "LEVEL", hide_possible_values = true)]
     verbose: Option<u8>,
 }
@@ -82,6 +85,8 @@ enum Command {
     Simulate(simulate::Arguments),
     /// Turn captured VLP-16 packets (pcap, pcapng) into a recording.
     Convert(convert::Arguments),
+    /// Show a recording or a session in a browser.
+    View(view::Arguments),
     /// Say what is in a recording.
     Inspect(inspect::Arguments),
     /// Print the complete configuration.
@@ -125,7 +130,11 @@ const EXIT_DAMAGED: u8 = 3;
 /// Runs the command line; the only place where exit codes are made.
 pub fn main() -> ExitCode {
     let line = CommandLine::parse();
-    log_to_stderr(line.verbose.unwrap_or(0) > 0);
+    log_to_stderr(match line.verbose {
+        None | Some(0) => Level::INFO,
+        Some(1) => Level::DEBUG,
+        Some(_) => Level::TRACE,
+    });
     let result = match line.command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
@@ -134,6 +143,7 @@ pub fn main() -> ExitCode {
         Command::Process(arguments) => process::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
+        Command::View(arguments) => view::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Health(arguments) => health::run(&arguments),
@@ -156,12 +166,7 @@ fn is_broken_pipe(error: &anyhow::Error) -> bool {
     io.map(kind) == Some(std::io::ErrorKind::BrokenPipe)
 }
 
-fn log_to_stderr(verbose: bool) {
-    let level = if verbose {
-        tracing::Level::DEBUG
-    } else {
-        tracing::Level::INFO
-    };
+fn log_to_stderr(level: Level) {
     tracing_subscriber::fmt()
         .with_max_level(level)
         .with_target(false)

@@ -1,6 +1,6 @@
 //! What comes in: counted, and the sound and useful into the queue.
 
-use tracing::debug;
+use tracing::trace;
 
 use super::fault_log::FaultLog;
 use super::queue::Queue;
@@ -53,7 +53,7 @@ impl Intake {
             });
         }
         if !Pipeline::concerns(envelope.data_type) {
-            debug!("message {} from {source} passed over", envelope.data_type);
+            trace!("message {} from {source} passed over", envelope.data_type);
         } else if envelope.data_type == POINT_CLOUD_ID {
             queue.push_revolution(datagram, arrival.time);
         } else if datagram.bytes().len() > LONGEST_POSE {

@@ -33,6 +33,7 @@ use tracing::{info, warn};
 use crate::config::Configuration;
 use crate::pipeline::Pipeline;
 use crate::time::Time;
+use crate::view::Feed;
 use health::Vitals;
 use intake::Intake;
 use queue::Queue;
@@ -40,7 +41,7 @@ use session::{Datagram, Receiver, Session, SessionError};
 use worker::Worker;
 
 /// What a user says on the command line about a daemon.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Options {
     /// Session.
     pub session: Session,
@@ -48,6 +49,8 @@ pub struct Options {
     pub sender_stamp: u32,
     /// Everything else.
     pub configuration: Configuration,
+    /// Where pictures go, if anybody may look.
+    pub view: Option<Feed>,
 }
 
 /// How often Status is sent.
@@ -87,6 +90,7 @@ pub async fn run(options: Options, stop: impl Future<Output = ()>) -> Result<(),
         options.sender_stamp,
         receiver.buffer_bytes(),
         &vitals,
+        options.view,
     );
     let queue = Queue::new(parameters.queue_revolutions);
     let result = tokio::select! {

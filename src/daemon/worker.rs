@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use tracing::{debug, info};
+use tracing::{debug, info, trace};
 
 use super::fault_log::FaultLog;
 use super::health::Vitals;
@@ -15,7 +15,9 @@ use crate::cloud::Dialect;
 use crate::ego::EgoReport;
 use crate::ground::Origin;
 use crate::odometry::Quality;
-use crate::pipeline::{Outcome, Pipeline, RevolutionReport};
+use crate::pipeline::{Outcome, Pipeline, RevolutionReport, Step};
+use crate::tally::Tally;
+use crate::view::Feed;
 use crate::wire::Envelope;
 use crate::wire::envelope::Postmark;
 
@@ -37,17 +39,19 @@ pub(super) struct Worker<'a> {
     dropped_revolutions: u64,
     log: FaultLog,
     frame: Vec<u8>,
+    view: Option<Feed>,
 }
 
 impl<'a> Worker<'a> {
     /// A worker that sends with `sender_stamp`, of a session with so many bytes of receive
-    /// buffer.
+    /// buffer, and shows what it does in a view, if there is one.
     pub(super) fn new(
         pipeline: Pipeline,
         sender: Sender,
         sender_stamp: u32,
         receive_buffer: usize,
         vitals: &'a Vitals,
+        view: Option<Feed>,
     ) -> Self {
         Self {
             pipeline,
@@ -63,6 +67,7 @@ impl<'a> Worker<'a> {
             dropped_revolutions: 0,
             log: FaultLog::default(),
             frame: vec![],
+            view,
         }
     }
 
@@ -73,21 +78,35 @@ impl<'a> Worker<'a> {
         let Ok((envelope, _)) = Envelope::from_datagram(job.datagram.bytes()) else {
             return;
         };
-        match self.pipeline.handle(&envelope) {
+        let mut view = self.view.take();
+        if let Some(view) = &mut view {
+            view.begin();
+        }
+        let note = |step| {
+            if let Some(view) = &mut view {
+                view.note(step);
+            }
+        };
+        match self.pipeline.handle_watched(&envelope, note) {
             Ok(Outcome::Revolution(report)) => {
                 let processing_s = begin.elapsed().as_secs_f32();
                 let frames = self.pipeline.publish_objects(now(), processing_s);
-                send(&self.sender, frames, &mut self.log);
+                send(&self.sender, frames, &mut self.log, &mut view);
                 self.latency.record(now() - job.arrival);
                 self.vitals.answered();
                 self.pipeline.update_map();
                 let frames = self.pipeline.publish_map(now());
-                send(&self.sender, frames, &mut self.log);
+                send(&self.sender, frames, &mut self.log, &mut view);
+                if let Some(view) = &mut view {
+                    view.note(Step::Map);
+                    view.show(&self.pipeline, &report, None);
+                }
                 self.tell(&report);
             }
             Ok(_) => {}
             Err(fault) => self.log.note(fault.name(), || fault.to_string()),
         }
+        self.view = view;
     }
 
     /// Notes what could not be answered.
@@ -133,8 +152,14 @@ impl<'a> Worker<'a> {
         };
         self.frame.clear();
         postmark.put(&mut self.frame, &status);
-        send(&self.sender, [&self.frame[..]], &mut self.log);
-        debug!("{status:?}");
+        send(
+            &self.sender,
+            [&self.frame[..]],
+            &mut self.log,
+            &mut self.view,
+        );
+        trace!("{status:?}");
+        debug!("{}", summary(&self.pipeline, latency.median_s));
         self.statuses += 1;
         if self.statuses.is_multiple_of(LOGGED) {
             self.log_latency();
@@ -212,7 +237,7 @@ impl<'a> Worker<'a> {
                 )
             }),
         }
-        debug!(
+        trace!(
             "revolution {}: {} returns, ground {:.2} m below, {} clusters, {} objects",
             report.number,
             report.returns,
@@ -223,9 +248,31 @@ impl<'a> Worker<'a> {
     }
 }
 
-/// Sends frames; what cannot be sent is told.
-fn send<'a>(sender: &Sender, frames: impl IntoIterator<Item = &'a [u8]>, log: &mut FaultLog) {
+/// What is around, in one line.
+fn summary(pipeline: &Pipeline, latency_s: f32) -> String {
+    let mut classes = Tally::default();
+    for object in pipeline.objects() {
+        classes.count(object.class.name());
+    }
+    let revolutions = pipeline.status().revolutions_published;
+    let objects = pipeline.objects().len();
+    format!(
+        "{revolutions} revolutions, {objects} objects now: {classes}; latency {:.1} ms",
+        1000.0 * latency_s
+    )
+}
+
+/// Sends frames, and shows them; what cannot be sent is told.
+fn send<'a>(
+    sender: &Sender,
+    frames: impl IntoIterator<Item = &'a [u8]>,
+    log: &mut FaultLog,
+    view: &mut Option<Feed>,
+) {
     for frame in frames {
+        if let Some(view) = view {
+            view.put(frame);
+        }
         if let Err(error) = sender.send(frame) {
             log.note("send", || error.to_string());
         }

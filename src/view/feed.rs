@@ -1,0 +1,128 @@
+//! Where pictures are made, if somebody looks.
+
+use std::net::SocketAddr;
+use std::time::Instant;
+
+use axum::body::Bytes;
+use tokio::sync::watch;
+
+use super::picture::{Around, Painter, Player};
+use crate::pipeline::{Pipeline, RevolutionReport, Step};
+use crate::time::Time;
+use crate::wire::Message;
+use crate::wire::envelope::Postmark;
+
+/// The newest picture.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Shown {
+    /// Counts pictures.
+    pub(super) number: u64,
+    pub(super) bytes: Bytes,
+}
+
+/// The pipeline's end of the view. Without a viewer it costs a comparison a revolution.
+#[derive(Debug)]
+pub struct Feed {
+    address: SocketAddr,
+    shown: watch::Sender<Shown>,
+    painter: Painter,
+    begun: Option<Instant>,
+    steps_ms: Vec<(&'static str, f32)>,
+    /// What was published since the last picture.
+    frames: Vec<u8>,
+}
+
+/// Of more frames than this since the last picture the oldest are left out: map tiles come again.
+const MOST_FRAME_BYTES: usize = 1 << 20;
+
+impl Feed {
+    pub(super) fn new(address: SocketAddr, shown: watch::Sender<Shown>) -> Self {
+        Self {
+            address,
+            shown,
+            painter: Painter::default(),
+            begun: None,
+            steps_ms: vec![],
+            frames: vec![],
+        }
+    }
+
+    /// Where the page is served.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Whether anybody looks.
+    pub fn is_watched(&self) -> bool {
+        self.shown.receiver_count() > 0
+    }
+
+    /// A revolution begins.
+    pub fn begin(&mut self) {
+        self.steps_ms.clear();
+        self.begun = self.is_watched().then(Instant::now);
+    }
+
+    /// A step of it is done.
+    pub fn note(&mut self, step: Step) {
+        let Some(begun) = &mut self.begun else { return };
+        let now = Instant::now();
+        let took_ms = 1000.0 * now.duration_since(*begun).as_secs_f32();
+        self.steps_ms.push((step.name(), took_ms));
+        *begun = now;
+    }
+
+    /// A frame was published.
+    pub fn put(&mut self, frame: &[u8]) {
+        if self.is_watched() {
+            if self.frames.len() > MOST_FRAME_BYTES {
+                self.frames.clear();
+            }
+            self.frames.extend_from_slice(frame);
+        }
+    }
+
+    /// Adds a message that is not published otherwise.
+    pub fn put_message<M: Message>(&mut self, time: Time, message: &M) {
+        if self.is_watched() {
+            let postmark = Postmark {
+                sent: time,
+                sampled: time,
+                sender_stamp: 0,
+            };
+            postmark.put(&mut self.frames, message);
+        }
+    }
+
+    /// Shows the pipeline's last revolution, and what was published since the last one.
+    pub fn show(&mut self, pipeline: &Pipeline, report: &RevolutionReport, player: Option<Player>) {
+        if !self.is_watched() {
+            self.frames.clear();
+            return;
+        }
+        let around = Around::of(pipeline, report.ground.plane.height_m());
+        self.painter.label(&around, pipeline);
+        self.send(&around, player);
+    }
+
+    /// Shows a revolution of which nobody knows what its points are.
+    pub fn show_points(&mut self, around: &Around<'_>) {
+        if !self.is_watched() {
+            self.frames.clear();
+            return;
+        }
+        self.painter.label_none(around.scan);
+        self.send(around, None);
+    }
+
+    fn send(&mut self, around: &Around<'_>, player: Option<Player>) {
+        let mut bytes = vec![];
+        self.painter
+            .paint(around, &self.steps_ms, player, &mut bytes);
+        bytes.append(&mut self.frames);
+        self.shown.send_modify(|shown| {
+            shown.number += 1;
+            shown.bytes = bytes.into();
+        });
+    }
+}

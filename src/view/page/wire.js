@@ -1,0 +1,148 @@
+// What the service publishes, read from its own bytes: frames, envelopes, protobuf.
+
+const u32 = "u32", s32 = "s32", f32 = "f32", f64 = "f64", bool = "bool", text = "text", bytes = "bytes";
+
+// Fields by number, as in kreisel.proto.
+const ENVELOPE = { 1: ["dataType", s32], 2: ["payload", bytes], 5: ["sampled", bytes], 6: ["senderStamp", u32] };
+const TIME = { 1: ["seconds", s32], 2: ["microseconds", s32] };
+const OBJECT = {
+  1: ["id", u32], 2: ["classification", u32], 3: ["classProbability", f32], 4: ["existence", f32],
+  5: ["measured", bool], 6: ["x", f64], 7: ["y", f64], 8: ["z", f64], 9: ["yaw", f32], 10: ["speed", f32],
+  11: ["yawRate", f32], 13: ["length", f32], 14: ["width", f32], 15: ["height", f32],
+  19: ["speedDeviation", f32], 20: ["age", f32], 22: ["points", u32],
+};
+const OBJECT_LIST = {
+  1: ["revolution", u32], 2: ["frame", u32], 3: ["egoKnown", bool], 4: ["egoX", f64], 5: ["egoY", f64],
+  6: ["egoZ", f64], 7: ["egoYaw", f32], 10: ["processingTime", f32], 11: ["objects", bytes],
+};
+const GRID_TILE = {
+  1: ["mapId", u32], 4: ["tileX", s32], 5: ["tileY", s32], 6: ["side", u32], 7: ["cellSize", f64],
+  8: ["encoding", u32], 10: ["cells", bytes], 11: ["anchorX", f64], 12: ["anchorY", f64], 13: ["anchorYaw", f64],
+};
+const STATUS = {
+  1: ["uptime", f64], 2: ["received", u32], 3: ["published", u32], 4: ["refused", u32], 5: ["queueDropped", u32],
+  7: ["kernelDropped", u32], 8: ["damaged", u32], 10: ["poses", u32], 11: ["faults", text],
+  12: ["latencyMedian", f32], 13: ["latencyP99", f32], 14: ["latencyMax", f32], 15: ["sensor", text],
+  16: ["columns", u32], 17: ["layers", u32], 18: ["rotationRate", f32], 19: ["byteOrder", text],
+  20: ["byteOrderSource", text], 21: ["distanceUnit", f32], 23: ["groundHeight", f32], 28: ["healthy", bool],
+  29: ["profile", text], 30: ["version", text], 32: ["odometry", text], 33: ["odometryDeviation", f32],
+  34: ["odometryRestarts", u32], 35: ["poseSource", text], 36: ["poseDisagreement", f32], 37: ["poseJumps", u32],
+};
+
+const KINDS = { 2021: ["list", OBJECT_LIST], 2022: ["tile", GRID_TILE], 2023: ["status", STATUS] };
+
+// A reader of varints and fixed numbers.
+class Reader {
+  constructor(array) {
+    this.array = array;
+    this.view = new DataView(array.buffer, array.byteOffset, array.byteLength);
+    this.at = 0;
+  }
+
+  get isAtEnd() {
+    return this.at >= this.array.length;
+  }
+
+  // Exact up to 2^53, which no counter reaches.
+  varint() {
+    let value = 0;
+    for (let scale = 1; ; scale *= 128) {
+      if (this.isAtEnd) throw new RangeError("a varint is cut off");
+      const byte = this.array[this.at++];
+      value += (byte & 127) * scale;
+      if (byte < 128) return value;
+    }
+  }
+
+  take(length) {
+    if (this.at + length > this.array.length) throw new RangeError("a field is cut off");
+    this.at += length;
+    return this.array.subarray(this.at - length, this.at);
+  }
+
+  float(length) {
+    const at = this.at;
+    this.take(length);
+    return length === 4 ? this.view.getFloat32(at, true) : this.view.getFloat64(at, true);
+  }
+}
+
+const isFalse = { u32: 0, s32: 0, f32: 0, f64: 0, bool: false, text: "", bytes: new Uint8Array() };
+
+function decode(array, fields) {
+  const message = {};
+  for (const [name, kind] of Object.values(fields)) message[name] = isFalse[kind];
+  const reader = new Reader(array);
+  while (!reader.isAtEnd) {
+    const key = reader.varint();
+    const [name, kind] = fields[Math.floor(key / 8)] ?? [];
+    const wire = key % 8;
+    let value;
+    if (wire === 0) value = reader.varint();
+    else if (wire === 1) value = reader.float(8);
+    else if (wire === 5) value = reader.float(4);
+    else if (wire === 2) value = reader.take(reader.varint());
+    else throw new RangeError(`wire type ${wire} is unknown`);
+    if (kind === s32) value = value % 2 ? -(value + 1) / 2 : value / 2;
+    else if (kind === bool) value = value !== 0;
+    else if (kind === text) value = new TextDecoder().decode(value);
+    if (name) message[name] = value;
+  }
+  return message;
+}
+
+function decodeObjects(array) {
+  const reader = new Reader(array);
+  const objects = [];
+  while (!reader.isAtEnd) objects.push(decode(reader.take(reader.varint()), OBJECT));
+  return objects;
+}
+
+// The messages in a row of frames: `0D A4`, a 24-bit length, an envelope.
+function* messages(array) {
+  for (let at = 0; at + 5 <= array.length;) {
+    const length = array[at + 2] | (array[at + 3] << 8) | (array[at + 4] << 16);
+    const envelope = decode(array.subarray(at + 5, at + 5 + length), ENVELOPE);
+    const [kind, fields] = KINDS[envelope.dataType] ?? [];
+    if (kind) {
+      const { seconds, microseconds } = decode(envelope.sampled, TIME);
+      const message = decode(envelope.payload, fields);
+      if (kind === "list") message.objects = decodeObjects(message.objects);
+      yield { kind, senderStamp: envelope.senderStamp, time: seconds + microseconds / 1e6, message };
+    }
+    at += 5 + length;
+  }
+}
+
+// A picture: heading, points, messages (the layout is in picture.rs).
+export function readPicture(buffer) {
+  const view = new DataView(buffer);
+  const headingLength = view.getUint32(0, true);
+  const heading = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, headingLength)));
+  const count = view.getUint32(4 + headingLength, true);
+  const begin = 8 + headingLength;
+  const axis = (number) => new Int16Array(buffer.slice(begin + 2 * count * number, begin + 2 * count * (number + 1)));
+  const points = {
+    count, x: axis(0), y: axis(1), z: axis(2),
+    kind: new Uint8Array(buffer, begin + 6 * count, count),
+  };
+  return { heading, points, messages: [...messages(new Uint8Array(buffer, begin + 7 * count))] };
+}
+
+// Levels of a tile's cells from 0 to 14, 7 is unknown, row by row from the south-west corner.
+export function readCells({ encoding, side, cells }) {
+  if (encoding !== 1 || side < 1 || side > 1024) return null;
+  const levels = new Uint8Array(side * side);
+  const reader = new Reader(cells);
+  for (let cell = 0; cell < levels.length;) {
+    if (reader.isAtEnd) return null;
+    const run = reader.varint();
+    const end = cell + Math.floor(run / 16);
+    if (end === cell || end > levels.length) return null;
+    for (; cell < end; cell++) {
+      const south = cell < side ? 7 : levels[cell - side];
+      levels[cell] = (south + run) & 15;
+    }
+  }
+  return levels;
+}

@@ -1,0 +1,371 @@
+//! The bytes of a picture.
+//!
+//! Little-endian: the length of a heading in bytes and the heading, which is JSON; the number of
+//! points, then x, y and z of all of them as 16-bit centimetres from the heading's origin in the
+//! local frame's directions, and a byte for each that says what it is; then the frames that
+//! were published, as they were sent.
+
+use serde::Serialize;
+
+use crate::cloud::{MAX_LAYERS, Scan};
+use crate::ego::{Anchor, Placement, Pose};
+use crate::pipeline::Pipeline;
+use crate::track::Object;
+
+/// What a point is: ground.
+const GROUND: u8 = 0;
+/// Neither ground nor of a cluster.
+const LOOSE: u8 = 1;
+/// Of a cluster that is no object: this and the numbers up to [`FIRST_OBJECT`], in turn.
+const FIRST_CLUSTER: u8 = 2;
+/// Of an object of the list: this and what follows, in turn.
+const FIRST_OBJECT: u8 = 128;
+
+/// Points in a picture. With this many a picture, its map tiles among it, stays below 200 kB.
+const MOST_POINTS: usize = 22_000;
+
+/// Bytes of a point.
+const POINT_LEN: usize = 7;
+
+/// Returns so far outside of an object's box are taken for its own, metres: boxes are tight.
+const MARGIN_M: f64 = 0.3;
+
+/// Where a recording that is played is.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Player {
+    /// Seconds since its begin.
+    pub at_s: f64,
+    /// Seconds from begin to end.
+    pub duration_s: f64,
+    /// Whether it goes on by itself.
+    pub is_playing: bool,
+    /// Times as fast as recorded.
+    pub speed: f64,
+    /// Counts how often it was begun anew.
+    pub run: u32,
+}
+
+/// A revolution as the picture needs it.
+#[derive(Debug, Clone, Copy)]
+pub struct Around<'a> {
+    /// Its points.
+    pub scan: &'a Scan,
+    /// How each column's points are placed in the odometry frame.
+    pub placements: &'a [Placement],
+    /// Where that lies in the local frame.
+    pub anchor: Anchor,
+    /// The sensor at the end of the sweep, in the local frame.
+    pub sensor: Pose,
+    /// How far below the sensor the ground is, metres.
+    pub ground_below_m: f64,
+}
+
+#[derive(Serialize)]
+struct Heading<'a> {
+    origin_m: [f64; 3],
+    yaw_rad: f64,
+    ground_below_m: f64,
+    steps_ms: &'a [(&'static str, f32)],
+    player: Option<Player>,
+}
+
+/// Makes pictures, one after the other.
+#[derive(Debug, Default)]
+pub(super) struct Painter {
+    kinds: Vec<u8>,
+    /// By how much the points of an object went on until the end of the sweep.
+    shifts_m: Vec<[f32; 2]>,
+    kept: Vec<u32>,
+}
+
+impl Painter {
+    /// Says of every point of the pipeline's last revolution what it is.
+    pub(super) fn label(&mut self, around: &Around<'_>, pipeline: &Pipeline) {
+        self.label_none(around.scan);
+        for (cluster, points) in pipeline.clusters().iter().enumerate() {
+            let kind = FIRST_CLUSTER + (cluster % usize::from(FIRST_OBJECT - FIRST_CLUSTER)) as u8;
+            for point in points {
+                self.kinds[*point as usize] = kind;
+            }
+        }
+        for (number, object) in pipeline.objects().iter().enumerate() {
+            let kind = FIRST_OBJECT + (number % usize::from(u8::MAX - FIRST_OBJECT + 1)) as u8;
+            self.label_object(around, object, kind);
+        }
+        let ground = pipeline.ground_mask();
+        for (kind, _) in self.kinds.iter_mut().zip(ground).filter(|(_, is)| **is) {
+            *kind = GROUND;
+        }
+    }
+
+    /// The same where nobody knows.
+    pub(super) fn label_none(&mut self, scan: &Scan) {
+        self.kinds.clear();
+        self.kinds.resize(scan.len(), LOOSE);
+        self.shifts_m.clear();
+        self.shifts_m.resize(scan.len(), [0.0; 2]);
+    }
+
+    /// Marks the points within an object's box, each where the box was at its time, and moves them to
+    /// where they are at the end of the sweep.
+    fn label_object(&mut self, around: &Around<'_>, object: &Object, kind: u8) {
+        let (sine, cosine) = libm::sincos(object.yaw_rad);
+        let half_m = [object.length_m, object.width_m].map(|side| 0.5 * side + MARGIN_M);
+        let [east, north, up] = object.centre_m;
+        let seen = around.sensor.placement().sensor_m([east, north]);
+        let scan = around.scan;
+        let age_s = scan.age_s(scan.column_at(libm::atan2(seen[0], seen[1])));
+        let shift_m = [cosine, sine].map(|part| part * object.speed_mps * age_s);
+        let corners_m =
+            [[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]].map(|[along, across]| {
+                let (along, across) = (along * half_m[0], across * half_m[1]);
+                around.sensor.placement().sensor_m([
+                    east - shift_m[0] + along * cosine - across * sine,
+                    north - shift_m[1] + along * sine + across * cosine,
+                ])
+            });
+        let height_m = 0.5 * object.height_m + MARGIN_M;
+        for column in scan.stretches_across(&corners_m).into_iter().flatten() {
+            for point in column * MAX_LAYERS..(column + 1) * MAX_LAYERS {
+                if !scan.has_return(point) {
+                    continue;
+                }
+                let [x, y, z] = around.place_m(point);
+                let (x, y) = (x - east + shift_m[0], y - north + shift_m[1]);
+                let is_within = libm::fabs(x * cosine + y * sine) < half_m[0]
+                    && libm::fabs(y * cosine - x * sine) < half_m[1]
+                    && libm::fabs(z - up) < height_m;
+                if is_within {
+                    self.kinds[point] = kind;
+                    self.shifts_m[point] = shift_m.map(|shift| shift as f32);
+                }
+            }
+        }
+    }
+
+    /// Appends the heading and the points; what they are was said before.
+    pub(super) fn paint(
+        &mut self,
+        around: &Around<'_>,
+        steps_ms: &[(&'static str, f32)],
+        player: Option<Player>,
+        out: &mut Vec<u8>,
+    ) {
+        let heading = Heading {
+            origin_m: around.sensor.position_m,
+            yaw_rad: around.sensor.yaw_rad,
+            ground_below_m: around.ground_below_m,
+            steps_ms,
+            player,
+        };
+        // A struct of numbers is always JSON.
+        let json = serde_json::to_vec(&heading).unwrap_or_default();
+        put_length(out, json.len());
+        out.extend_from_slice(&json);
+
+        let scan = around.scan;
+        self.kept.clear();
+        let returns = (0..scan.len()).filter(|point| scan.has_return(*point));
+        self.kept.extend(returns.map(|point| point as u32));
+        let step = self.kept.len().div_ceil(MOST_POINTS).max(1);
+        let kept: Vec<usize> = self
+            .kept
+            .iter()
+            .step_by(step)
+            .map(|point| *point as usize)
+            .collect();
+        put_length(out, kept.len());
+        let begin = out.len();
+        out.resize(begin + POINT_LEN * kept.len(), 0);
+        let (places, kinds) = out[begin..].split_at_mut((POINT_LEN - 1) * kept.len());
+        for (number, point) in kept.iter().enumerate() {
+            let place_m = around.place_m(*point);
+            for (axis, shift) in self.shifts_m[*point]
+                .iter()
+                .copied()
+                .chain([0.0])
+                .enumerate()
+            {
+                let from_origin_m =
+                    place_m[axis] + f64::from(shift) - around.sensor.position_m[axis];
+                let at = 2 * (axis * kept.len() + number);
+                let centimetres = (100.0 * from_origin_m) as i16;
+                places[at..at + 2].copy_from_slice(&centimetres.to_le_bytes());
+            }
+            kinds[number] = self.kinds[*point];
+        }
+    }
+}
+
+impl<'a> Around<'a> {
+    /// The last revolution of a pipeline, which found the ground so far below the sensor.
+    pub(super) fn of(pipeline: &'a Pipeline, ground_below_m: f64) -> Self {
+        Self {
+            scan: pipeline.scan(),
+            placements: pipeline.placements(),
+            anchor: pipeline.sweep().anchor,
+            sensor: pipeline.sweep().local_sensor(),
+            ground_below_m,
+        }
+    }
+
+    /// Where a point lies in the local frame.
+    fn place_m(&self, point: usize) -> [f64; 3] {
+        let [x, y, z] = self.scan.point_m(point).map(f64::from);
+        let placement = &self.placements[self.scan.column(point)];
+        let [x, y] = placement.local_m([x, y]);
+        let [x, y, _] = self.anchor.place_m([x, y, 0.0]);
+        [x, y, self.sensor.position_m[2] + z]
+    }
+}
+
+fn put_length(out: &mut Vec<u8>, length: usize) {
+    out.extend_from_slice(&(length as u32).to_le_bytes());
+}
+
+/// Every how many points are left of a picture for a slow viewer.
+const THINNING: usize = 4;
+
+/// The same picture with a fourth of its points, for a viewer that cannot keep up.
+pub(super) fn thinned(picture: &[u8]) -> Option<Vec<u8>> {
+    let length = |at: usize| {
+        let bytes = picture.get(at..at + 4)?.try_into().ok()?;
+        Some(u32::from_le_bytes(bytes) as usize)
+    };
+    let points_at = 4 + length(0)?;
+    let points = length(points_at)?;
+    let begin = points_at + 4;
+    let (places, rest) = picture.get(begin..)?.split_at_checked(6 * points)?;
+    let (kinds, frames) = rest.split_at_checked(points)?;
+    let mut thin = picture[..points_at].to_vec();
+    put_length(&mut thin, points.div_ceil(THINNING));
+    for axis in places.chunks(2 * points.max(1)) {
+        thin.extend(axis.chunks(2).step_by(THINNING).flatten());
+    }
+    thin.extend(kinds.iter().step_by(THINNING));
+    thin.extend_from_slice(frames);
+    Some(thin)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Configuration;
+    use crate::pipeline::Outcome;
+    use crate::simulate::{Simulation, scenario};
+    use crate::wire::Recording;
+
+    /// The picture of a simulated roundabout after 4 s.
+    fn roundabout() -> (Pipeline, f64) {
+        let scene = scenario::all()
+            .iter()
+            .find(|scene| scene.name == "roundabout");
+        let mut simulation = Simulation::new(*scene.unwrap(), 1);
+        let mut pipeline = Pipeline::new(&Configuration::default(), 0);
+        let (mut bytes, mut ground_below_m) = (vec![], 0.0);
+        for _ in 0..40 {
+            bytes.clear();
+            simulation.revolve(&mut bytes);
+            for entry in Recording::new(&bytes).flatten() {
+                if let Ok(Outcome::Revolution(report)) = pipeline.handle(&entry.envelope) {
+                    ground_below_m = report.ground.plane.height_m();
+                }
+            }
+        }
+        (pipeline, ground_below_m)
+    }
+
+    struct Read {
+        heading: serde_json::Value,
+        places_m: Vec<[f64; 3]>,
+        kinds: Vec<u8>,
+        rest: Vec<u8>,
+    }
+
+    fn read(picture: &[u8]) -> Read {
+        let length =
+            |at: usize| u32::from_le_bytes(picture[at..at + 4].try_into().unwrap()) as usize;
+        let (json, points) = (length(0), length(4 + length(0)));
+        let begin = 8 + json;
+        let centimetres = |axis: usize, point: usize| {
+            let at = begin + 2 * (axis * points + point);
+            f64::from(i16::from_le_bytes([picture[at], picture[at + 1]]))
+        };
+        Read {
+            heading: serde_json::from_slice(&picture[4..4 + json]).unwrap(),
+            places_m: (0..points)
+                .map(|point| [0, 1, 2].map(|axis| 0.01 * centimetres(axis, point)))
+                .collect(),
+            kinds: picture[begin + 6 * points..begin + 7 * points].to_vec(),
+            rest: picture[begin + 7 * points..].to_vec(),
+        }
+    }
+
+    #[test]
+    fn returns_of_an_object_lie_in_its_box_at_the_end_of_the_sweep() {
+        let (pipeline, ground_below_m) = roundabout();
+        let around = Around::of(&pipeline, ground_below_m);
+        let (mut painter, mut bytes) = (Painter::default(), vec![]);
+        painter.label(&around, &pipeline);
+        painter.paint(&around, &[("cloud", 0.1)], None, &mut bytes);
+        assert!(bytes.len() < 200_000, "{}", bytes.len());
+        let picture = read(&bytes);
+        assert_eq!(picture.kinds.len(), pipeline.scan().returns());
+        assert_eq!(picture.heading["steps_ms"][0][0], "cloud");
+        let [east, north, _] = around.sensor.position_m;
+        let moving = pipeline
+            .objects()
+            .iter()
+            .filter(|object| object.measured && object.speed_mps > 3.0);
+        let mut tried = 0;
+        for object in moving {
+            let number = pipeline
+                .objects()
+                .iter()
+                .position(|other| other.id == object.id)
+                .unwrap();
+            let own = picture.places_m.iter().zip(&picture.kinds);
+            let own: Vec<_> = own
+                .filter(|(_, kind)| usize::from(**kind) == 128 + number)
+                .collect();
+            assert!(
+                2 * own.len() > object.points,
+                "{} of {}",
+                own.len(),
+                object.points
+            );
+            for ([x, y, _], _) in own {
+                let (x, y) = (
+                    x + east - object.centre_m[0],
+                    y + north - object.centre_m[1],
+                );
+                let (sine, cosine) = libm::sincos(object.yaw_rad);
+                assert!(
+                    libm::fabs(x * cosine + y * sine) < 0.5 * object.length_m + MARGIN_M + 0.02
+                );
+                assert!(libm::fabs(y * cosine - x * sine) < 0.5 * object.width_m + MARGIN_M + 0.02);
+            }
+            tried += 1;
+        }
+        assert!(tried > 1, "{tried}");
+    }
+
+    #[test]
+    fn a_slow_viewer_gets_a_fourth_of_the_points_and_all_frames() {
+        let (pipeline, ground_below_m) = roundabout();
+        let around = Around::of(&pipeline, ground_below_m);
+        let (mut painter, mut bytes) = (Painter::default(), vec![]);
+        painter.label_none(around.scan);
+        painter.paint(&around, &[], None, &mut bytes);
+        bytes.extend_from_slice(b"frames");
+        let (whole, thin) = (read(&bytes), read(&thinned(&bytes).unwrap()));
+        assert_eq!(thin.heading, whole.heading);
+        assert_eq!(thin.rest, b"frames");
+        let fourth: Vec<_> = whole.places_m.iter().copied().step_by(4).collect();
+        assert_eq!(thin.places_m, fourth);
+        assert_eq!(thin.kinds, vec![LOOSE; fourth.len()]);
+        for cut in [0, 3, 100, bytes.len() - 7] {
+            assert!(thinned(&bytes[..cut]).is_none(), "{cut}");
+        }
+    }
+}

@@ -1,0 +1,333 @@
+//! The page and its pictures over HTTP.
+
+use std::io;
+use std::net::{IpAddr, SocketAddr};
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::Bytes;
+use axum::extract::State;
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use serde::Deserialize;
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, watch};
+use tokio::time::timeout;
+
+use super::feed::{Feed, Shown};
+use super::picture;
+
+/// Where the view is served if nothing else is said: for this host only.
+pub const DEFAULT_ADDRESS: &str = "127.0.0.1:8111";
+
+/// Viewers at a time; more are turned away.
+const MOST_VIEWERS: usize = 64;
+
+/// Connections at a time; more wait.
+const MOST_CONNECTIONS: usize = 256;
+
+/// A viewer that takes no picture for so long is gone.
+const PATIENCE: Duration = Duration::from_secs(90);
+
+/// Longest message of a viewer, bytes.
+const LONGEST_CONTROL: usize = 1024;
+
+/// Messages of viewers that wait; more are left out.
+const MOST_CONTROLS: usize = 16;
+
+/// What a viewer of a recording asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Control {
+    /// Go on, or pause.
+    Play(bool),
+    /// So many times as fast as recorded.
+    Speed(f64),
+    /// To a time, seconds since the begin.
+    Seek(f64),
+    /// So many revolutions on, or back.
+    Step(i32),
+}
+
+#[derive(Clone)]
+struct Served {
+    shown: watch::Sender<Shown>,
+    controls: mpsc::Sender<Control>,
+    viewers: Arc<Semaphore>,
+    is_local: bool,
+}
+
+/// Serves the view at an address from a thread of its own for as long as the process lives.
+/// Gives where pictures go in and what viewers ask for.
+///
+/// # Errors
+/// When the address cannot be had.
+pub fn serve(address: SocketAddr) -> io::Result<(Feed, mpsc::Receiver<Control>)> {
+    let listener = std::net::TcpListener::bind(address)?;
+    listener.set_nonblocking(true)?;
+    // The system's choice, if port 0 was asked for.
+    let address = listener.local_addr()?;
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()?;
+    let shown = watch::Sender::new(Shown::default());
+    let (controls, asked) = mpsc::channel(MOST_CONTROLS);
+    let served = Served {
+        shown: shown.clone(),
+        controls,
+        viewers: Arc::new(Semaphore::new(MOST_VIEWERS)),
+        is_local: address.ip().is_loopback(),
+    };
+    let serve = move || {
+        runtime.block_on(async {
+            let listener = Limited {
+                listener: TcpListener::from_std(listener)?,
+                connections: Arc::new(Semaphore::new(MOST_CONNECTIONS)),
+            };
+            axum::serve(listener, router(served)).await
+        })
+    };
+    std::thread::Builder::new()
+        .name("view".into())
+        .spawn(serve)?;
+    Ok((Feed::new(address, shown), asked))
+}
+
+/// A listener that takes so many connections at a time.
+struct Limited {
+    listener: TcpListener,
+    connections: Arc<Semaphore>,
+}
+
+impl axum::serve::Listener for Limited {
+    type Io = Connection;
+    type Addr = SocketAddr;
+
+    async fn accept(&mut self) -> (Self::Io, Self::Addr) {
+        loop {
+            // The semaphore is never closed.
+            let Ok(permit) = self.connections.clone().acquire_owned().await else {
+                return std::future::pending().await;
+            };
+            let (stream, address) = axum::serve::Listener::accept(&mut self.listener).await;
+            if stream.set_nodelay(true).is_ok() {
+                return (
+                    Connection {
+                        stream,
+                        _permit: permit,
+                    },
+                    address,
+                );
+            }
+        }
+    }
+
+    fn local_addr(&self) -> io::Result<Self::Addr> {
+        self.listener.local_addr()
+    }
+}
+
+/// A connection, counted for as long as it lives.
+struct Connection {
+    stream: TcpStream,
+    _permit: OwnedSemaphorePermit,
+}
+
+impl AsyncRead for Connection {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_read(context, buffer)
+    }
+}
+
+impl AsyncWrite for Connection {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        Pin::new(&mut self.stream).poll_write(context, bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(context)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(context)
+    }
+}
+
+macro_rules! page {
+    ($($path:literal => $file:literal, $kind:literal;)*) => {
+        /// The page's files, each with its path and type.
+        const PAGE: &[(&str, &str, &str)] = &[
+            $(($path, $kind, include_str!(concat!("page/", $file))),)*
+        ];
+    };
+}
+
+page! {
+    "/" => "index.html", "text/html; charset=utf-8";
+    "/style.css" => "style.css", "text/css; charset=utf-8";
+    "/main.js" => "main.js", "text/javascript; charset=utf-8";
+    "/wire.js" => "wire.js", "text/javascript; charset=utf-8";
+    "/map.js" => "map.js", "text/javascript; charset=utf-8";
+    "/scene.js" => "scene.js", "text/javascript; charset=utf-8";
+    "/panel.js" => "panel.js", "text/javascript; charset=utf-8";
+}
+
+/// The page loads nothing from elsewhere, and no other page may frame it.
+const POLICY: &str = "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'";
+
+fn router(served: Served) -> Router {
+    let files = PAGE
+        .iter()
+        .fold(Router::new(), |router, (path, kind, text)| {
+            let headers = [
+                (header::CONTENT_TYPE, *kind),
+                (header::CONTENT_SECURITY_POLICY, POLICY),
+                (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+                (header::CACHE_CONTROL, "no-cache"),
+            ];
+            router.route(path, get(move || async move { (headers, *text) }))
+        });
+    files.route("/pictures", get(pictures)).with_state(served)
+}
+
+/// Opens the stream of pictures.
+async fn pictures(
+    State(served): State<Served>,
+    headers: HeaderMap,
+    upgrade: WebSocketUpgrade,
+) -> Response {
+    if !is_own_page(&headers, served.is_local) {
+        let why = "only the page that is served here may look";
+        return (StatusCode::FORBIDDEN, why).into_response();
+    }
+    let Ok(place) = served.viewers.clone().try_acquire_owned() else {
+        return (StatusCode::SERVICE_UNAVAILABLE, "too many viewers").into_response();
+    };
+    let upgrade = upgrade
+        .max_message_size(LONGEST_CONTROL)
+        .max_frame_size(LONGEST_CONTROL);
+    upgrade.on_upgrade(move |socket| async move {
+        watch(socket, served.shown.subscribe(), served.controls).await;
+        drop(place);
+    })
+}
+
+/// Whether a browser asks for our own page, not for another one that points at this host: a
+/// WebSocket is not held back by the same-origin policy. What is no browser names no origin.
+fn is_own_page(headers: &HeaderMap, is_local: bool) -> bool {
+    let text = |name| {
+        headers
+            .get(name)
+            .and_then(|value: &HeaderValue| value.to_str().ok())
+    };
+    let Some(host) = text(header::HOST) else {
+        return false;
+    };
+    let is_same = text(header::ORIGIN).is_none_or(|origin| {
+        origin
+            .split_once("://")
+            .is_some_and(|(_, authority)| authority == host)
+    });
+    // A name that somebody else's name server leads here must not do.
+    let name = host.rsplit_once(':').map_or(host, |(name, _)| name);
+    let is_address = name.trim_matches(['[', ']']).parse::<IpAddr>().is_ok();
+    is_same && (!is_local || is_address || name == "localhost")
+}
+
+/// Sends pictures to a viewer, always the newest, and takes what it asks for, until it is gone.
+async fn watch(
+    mut socket: WebSocket,
+    mut shown: watch::Receiver<Shown>,
+    controls: mpsc::Sender<Control>,
+) {
+    let mut last = None;
+    loop {
+        tokio::select! {
+            changed = shown.changed() => {
+                if changed.is_err() {
+                    return;
+                }
+                let newest = shown.borrow_and_update().clone();
+                let is_behind = last.is_some_and(|last| newest.number > last + 1);
+                last = Some(newest.number);
+                let bytes = if is_behind {
+                    picture::thinned(&newest.bytes).map_or(newest.bytes, Bytes::from)
+                } else {
+                    newest.bytes
+                };
+                let sent = timeout(PATIENCE, socket.send(Message::Binary(bytes))).await;
+                if !matches!(sent, Ok(Ok(()))) {
+                    return;
+                }
+            }
+            message = socket.recv() => match message {
+                Some(Ok(Message::Text(text))) => {
+                    if let Ok(control) = serde_json::from_str(&text) {
+                        // When nobody listens, or too much was asked for, it is left out.
+                        let _ = controls.try_send(control);
+                    }
+                }
+                Some(Ok(_)) => {}
+                Some(Err(_)) | None => return,
+            },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_page_itself_may_look() {
+        let headers = |host: &'static str, origin: Option<&'static str>| {
+            let mut headers = HeaderMap::new();
+            headers.insert(header::HOST, HeaderValue::from_static(host));
+            if let Some(origin) = origin {
+                headers.insert(header::ORIGIN, HeaderValue::from_static(origin));
+            }
+            headers
+        };
+        let here = "127.0.0.1:8111";
+        assert!(is_own_page(
+            &headers(here, Some("http://127.0.0.1:8111")),
+            true
+        ));
+        assert!(is_own_page(&headers("[::1]:8111", None), true));
+        assert!(is_own_page(&headers("localhost:8111", None), true));
+        assert!(!is_own_page(
+            &headers(here, Some("http://elsewhere.example")),
+            true
+        ));
+        let misled = headers(
+            "elsewhere.example:8111",
+            Some("http://elsewhere.example:8111"),
+        );
+        assert!(!is_own_page(&misled, true));
+        assert!(is_own_page(&misled, false));
+        assert!(!is_own_page(&HeaderMap::new(), false));
+    }
+
+    #[test]
+    fn what_a_viewer_asks_for_is_read() {
+        let read = |text| serde_json::from_str::<Control>(text).ok();
+        assert_eq!(read(r#"{"play":true}"#), Some(Control::Play(true)));
+        assert_eq!(read(r#"{"seek":1.5}"#), Some(Control::Seek(1.5)));
+        assert_eq!(read(r#"{"step":-1}"#), Some(Control::Step(-1)));
+        assert_eq!(read("[]"), None);
+    }
+}
