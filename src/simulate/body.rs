@@ -3,11 +3,9 @@
 //! Outlines are of everyday vehicles: sloped screens, rounded corners, gaps below the sills,
 //! wheels. Glass lets most rays through, spokes and frames some.
 
-use super::scenario::{Class, Variant};
+use super::scenario::{Class, Load, Variant};
 use super::solid::{Fabric, Shape, Solid, block, extruded};
 
-/// Share of rays that pass a window and come back from nothing of the vehicle.
-const GLASS: Fabric = Fabric::Open(0.6);
 const RUBBER: f64 = 0.08;
 const CLOTH: f64 = 0.35;
 
@@ -100,7 +98,7 @@ fn car(variant: &Variant) -> Vec<Solid> {
     let track_m = wide_m - 0.12;
     let mut parts = vec![
         solid(rounded(&body, wide_m, 0.3), Fabric::Dense, paint),
-        solid(Shape::Convex(leaning), GLASS, 0.1),
+        solid(Shape::Convex(leaning), Fabric::Open(variant.glass), 0.1),
         // Roof and pillars, within the glass.
         solid(
             block(
@@ -281,7 +279,8 @@ fn pedestrian(variant: &Variant, travelled_m: f64) -> Vec<Solid> {
     };
     let reflectance = variant.reflectance;
     let side_m = 0.5 * width_m - 0.06;
-    vec![
+    let mut parts = load(variant);
+    parts.extend([
         solid(
             block(
                 [-0.12, -0.5 * width_m + 0.1, hip_m - 0.05],
@@ -313,7 +312,48 @@ fn pedestrian(variant: &Variant, travelled_m: f64) -> Vec<Solid> {
             Fabric::Dense,
             reflectance,
         ),
-    ]
+    ]);
+    parts
+}
+
+/// What somebody on foot has along.
+fn load(variant: &Variant) -> Vec<Solid> {
+    let height_m = variant.size_m[2];
+    let cloth = |shape: Shape| solid(shape, Fabric::Dense, CLOTH);
+    match variant.load {
+        Load::None => vec![],
+        Load::Pack => {
+            let pack = block(
+                [-0.5, -0.22, 0.5 * height_m],
+                [-0.14, 0.22, height_m + 0.55],
+            );
+            vec![cloth(pack)]
+        }
+        Load::Umbrella => vec![cloth(Shape::Cylinder {
+            centre_m: [0.1, 0.0],
+            radius_m: 0.5,
+            low_m: height_m + 0.05,
+            high_m: height_m + 0.25,
+        })],
+        Load::Pram => vec![
+            cloth(block([0.5, -0.25, 0.45], [1.25, 0.25, 0.8])),
+            cloth(block([0.5, -0.25, 0.8], [0.8, 0.25, 1.05])),
+            solid(
+                block([0.25, -0.27, 0.05], [1.25, 0.27, 0.45]),
+                Fabric::Open(0.7),
+                0.2,
+            ),
+        ],
+        Load::Suitcase => vec![cloth(block([-0.8, -0.2, 0.05], [-0.55, 0.2, 0.75]))],
+        Load::Wheelchair => vec![
+            cloth(block([-0.3, -0.25, 0.3], [0.35, 0.25, 0.6])),
+            solid(
+                block([-0.35, -0.32, 0.0], [0.35, 0.32, 0.62]),
+                Fabric::Open(0.6),
+                RUBBER,
+            ),
+        ],
+    }
 }
 
 #[cfg(test)]
@@ -327,7 +367,7 @@ mod tests {
         let variant = Variant {
             class,
             size_m,
-            reflectance: 0.5,
+            ..Variant::bus()
         };
         let parts = parts(&variant, 0.0);
         let luck = &mut Random::new(3);

@@ -44,9 +44,6 @@ use solid::Hit;
 const EPOCH: Time = Time::from_micros(1_700_000_000_000_000);
 /// Revolutions a second.
 const ROTATION_HZ: f64 = 10.0;
-/// Standard deviation of a range at right angles (VLP-16 user manual: accuracy of 3 cm,
-/// "typical"; a surface at rest shows 1 to 2 cm).
-const RANGE_DEVIATION_M: f64 = 0.015;
 /// Full angle of the beam (VLP-16 user manual: 3 mrad).
 const BEAM_RAD: f64 = 0.003;
 /// Share of the beam's footprint along the ray by which a range at grazing angles scatters.
@@ -225,7 +222,9 @@ impl Simulation {
                 let follow = (self.column + turn_of(self.column)).is_multiple_of(3);
                 surveyor.note(&self.scene, seconds_of(self.column), &ray, end, follow);
             }
-            let units = nearest.map_or(0, |(hit, _)| measured(&hit, luck));
+            let units = nearest.map_or(0, |(hit, _)| {
+                measured(&hit, self.scene.range_deviation_m, luck)
+            });
             let label = match nearest {
                 _ if units == 0 => label::NO_RETURN,
                 None => label::NO_RETURN,
@@ -280,12 +279,12 @@ impl Simulation {
 }
 
 /// Centimetres, cut off as the device service does, or 0 where nothing comes back.
-fn measured(hit: &Hit, luck: &mut Random) -> u16 {
+fn measured(hit: &Hit, range_deviation_m: f64, luck: &mut Random) -> u16 {
     let signal = hit.reflectance * hit.incidence / (hit.range_m * hit.range_m);
     let seen = 1.0 / (1.0 + (THRESHOLD / signal.max(1e-12)).powf(SHARPNESS));
     // At a grazing angle the spot is long, and the range is that of some part of it.
     let footprint_m = hit.range_m * BEAM_RAD / hit.incidence.max(0.02);
-    let deviation_m = libm::hypot(RANGE_DEVIATION_M, FOOTPRINT_SHARE * footprint_m);
+    let deviation_m = libm::hypot(range_deviation_m, FOOTPRINT_SHARE * footprint_m);
     let range_m = hit.range_m + deviation_m * luck.normal();
     if RANGE_M.contains(&range_m) && luck.uniform() < seen * (1.0 - DROPOUTS) {
         (range_m / UNIT_M) as u16

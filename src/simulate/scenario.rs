@@ -40,7 +40,31 @@ pub struct Variant {
     pub size_m: [f64; 3],
     /// Share of the light that its paint or coat throws back.
     pub reflectance: f64,
+    /// Share of rays that pass its windows and come back from nothing of it.
+    pub glass: f64,
+    /// What somebody on foot has along.
+    pub load: Load,
 }
+
+/// What somebody on foot carries, pushes, pulls or sits in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Load {
+    /// Nothing.
+    None,
+    /// Something on the back that towers above the head.
+    Pack,
+    /// An open umbrella.
+    Umbrella,
+    /// A pram ahead.
+    Pram,
+    /// A suitcase behind.
+    Suitcase,
+    /// A wheelchair.
+    Wheelchair,
+}
+
+/// Glass as on most windows.
+const GLASS: f64 = 0.6;
 
 /// Small car, two hatchbacks, two notchbacks, an SUV, a van.
 const CARS_M: [[f64; 3]; 7] = [
@@ -61,6 +85,8 @@ impl Variant {
             class: Class::Car,
             size_m: size_m.map(|metres| metres * (0.97 + 0.06 * random.uniform())),
             reflectance: 0.1 + 0.6 * random.uniform(),
+            glass: GLASS,
+            load: Load::None,
         }
     }
 
@@ -69,6 +95,8 @@ impl Variant {
             class: Class::Truck,
             size_m: [12.0, 2.55, 3.1],
             reflectance: 0.5,
+            glass: GLASS,
+            load: Load::None,
         }
     }
 
@@ -77,6 +105,8 @@ impl Variant {
             class: Class::Truck,
             size_m: [7.5, 2.45, 3.3],
             reflectance: 0.5,
+            glass: GLASS,
+            load: Load::None,
         }
     }
 
@@ -89,6 +119,8 @@ impl Variant {
                 1.62 + 0.24 * random.uniform(),
             ],
             reflectance: 0.2 + 0.5 * random.uniform(),
+            glass: GLASS,
+            load: Load::None,
         }
     }
 
@@ -101,6 +133,8 @@ impl Variant {
                 1.58 + 0.3 * random.uniform(),
             ],
             reflectance: 0.15 + 0.5 * random.uniform(),
+            glass: GLASS,
+            load: Load::None,
         }
     }
 }
@@ -138,6 +172,8 @@ pub struct Scene {
     pub actors: Vec<Actor>,
     pub(super) scenery: Scenery,
     pub(super) terrain: Terrain,
+    /// Standard deviation of a range at right angles.
+    pub(super) range_deviation_m: f64,
 }
 
 /// A scene that can be made.
@@ -202,9 +238,8 @@ mod tests {
                 let scene = scenario.scene(seed);
                 let ego = Actor {
                     variant: Variant {
-                        class: Class::Car,
                         size_m: [4.5, 1.9, 1.5],
-                        reflectance: 0.5,
+                        ..Variant::car(&mut Random::new(1))
                     },
                     path: scene.ego.clone(),
                 };

@@ -133,6 +133,55 @@ impl Scenery {
         self.bar(at_m, yaw_deg, sizes, heights, Fabric::Leaves(0.25), 0.4)
     }
 
+    /// A box on the ground: a bin, a kiosk, a container.
+    pub(super) fn cabinet(
+        &mut self,
+        at_m: [f64; 2],
+        yaw_deg: f64,
+        sizes_m: [f64; 2],
+        high_m: f64,
+    ) -> &mut Self {
+        self.bar(
+            at_m,
+            yaw_deg,
+            sizes_m,
+            [-ROOT_M, high_m],
+            Fabric::Dense,
+            0.3,
+        )
+    }
+
+    /// A fence through which a share of the rays passes.
+    pub(super) fn fence(
+        &mut self,
+        at_m: [f64; 2],
+        yaw_deg: f64,
+        length_m: f64,
+        high_m: f64,
+        open: f64,
+    ) -> &mut Self {
+        self.bar(
+            at_m,
+            yaw_deg,
+            [length_m, 0.06],
+            [0.0, high_m],
+            Fabric::Open(open),
+            0.3,
+        )
+    }
+
+    /// A guard rail.
+    pub(super) fn rail(&mut self, at_m: [f64; 2], yaw_deg: f64, length_m: f64) -> &mut Self {
+        self.bar(
+            at_m,
+            yaw_deg,
+            [length_m, 0.1],
+            [0.45, 0.75],
+            Fabric::Dense,
+            0.6,
+        )
+    }
+
     pub(super) fn bush(&mut self, at_m: [f64; 2], radius_m: f64, high_m: f64) -> &mut Self {
         self.drum(at_m, radius_m, [0.0, high_m], Fabric::Leaves(0.3), 0.4)
     }

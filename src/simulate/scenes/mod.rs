@@ -3,6 +3,7 @@
 mod places;
 mod roads;
 mod roundabouts;
+mod strangers;
 
 use super::path::Path;
 use super::scenario::{Actor, Scenario, Variant};
@@ -53,8 +54,22 @@ pub(super) const ALL: &[Scenario] = &[
         summary: "a standing sensor beside a road, with traffic at all ranges",
         build: roads::standing,
     },
+    Scenario {
+        name: "strangers",
+        summary: "a street that chance furnishes: parked vehicles, people with loads and in groups, \
+                  traffic, hedges, walls, bins, signs; no two seeds are alike",
+        build: strangers::strangers,
+    },
+    Scenario {
+        name: "furniture",
+        summary: "the same without any road user: vegetation and street furniture",
+        build: strangers::furniture,
+    },
 ];
 
+/// Standard deviation of a range at right angles (VLP-16 user manual: accuracy of 3 cm,
+/// "typical"; a surface at rest shows 1 to 2 cm).
+const RANGE_DEVIATION_M: f64 = 0.015;
 /// Height of the sensor above the road: on the roof of a large car.
 const SENSOR_M: f64 = 2.0;
 /// From the middle of a road to the middle of a lane.

@@ -1,6 +1,6 @@
 //! Places: a car park and a course of occlusions.
 
-use super::{SENSOR_M, about, actor};
+use super::{RANGE_DEVIATION_M, SENSOR_M, about, actor};
 use crate::random::Random;
 use crate::simulate::path::Path;
 use crate::simulate::scenario::{PoseMessages, Scene, Variant};
@@ -71,6 +71,7 @@ pub(super) fn car_park(random: &mut Random) -> Scene {
         actors,
         scenery,
         terrain,
+        range_deviation_m: RANGE_DEVIATION_M,
     }
 }
 
@@ -121,5 +122,6 @@ pub(super) fn occlusion(random: &mut Random) -> Scene {
         actors,
         scenery,
         terrain,
+        range_deviation_m: RANGE_DEVIATION_M,
     }
 }

@@ -1,6 +1,6 @@
 //! Traffic along a road: a street, a hill, and a sensor beside it.
 
-use super::{LANE_M, SENSOR_M, about, actor};
+use super::{LANE_M, RANGE_DEVIATION_M, SENSOR_M, about, actor};
 use crate::random::Random;
 use crate::simulate::path::Path;
 use crate::simulate::scenario::{PoseMessages, Scene, Variant};
@@ -93,6 +93,7 @@ pub(super) fn street(random: &mut Random) -> Scene {
         actors,
         scenery,
         terrain,
+        range_deviation_m: RANGE_DEVIATION_M,
     }
 }
 
@@ -158,6 +159,7 @@ pub(super) fn hill(random: &mut Random) -> Scene {
         actors,
         scenery,
         terrain,
+        range_deviation_m: RANGE_DEVIATION_M,
     }
 }
 
@@ -210,5 +212,6 @@ pub(super) fn standing(random: &mut Random) -> Scene {
         actors,
         scenery,
         terrain,
+        range_deviation_m: RANGE_DEVIATION_M,
     }
 }

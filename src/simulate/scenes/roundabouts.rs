@@ -1,6 +1,6 @@
 //! Roundabouts, large and small.
 
-use super::{LANE_M, SENSOR_M, about, actor};
+use super::{LANE_M, RANGE_DEVIATION_M, SENSOR_M, about, actor};
 use crate::random::Random;
 use crate::simulate::path::Path;
 use crate::simulate::scenario::{Actor, PoseMessages, Scene, Variant};
@@ -73,6 +73,7 @@ pub(super) fn roundabout(random: &mut Random) -> Scene {
             swells: vec![],
             unevenness_m: 0.02,
         },
+        range_deviation_m: RANGE_DEVIATION_M,
     }
 }
 
@@ -210,5 +211,6 @@ pub(super) fn mini_roundabout(random: &mut Random) -> Scene {
         actors,
         scenery,
         terrain,
+        range_deviation_m: RANGE_DEVIATION_M,
     }
 }

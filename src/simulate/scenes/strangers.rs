@@ -1,0 +1,342 @@
+//! Streets that chance furnishes, so that nothing is fitted to a scene: every seed draws other
+//! things, sizes, places, paints, panes, slopes, another height of the sensor and other noise.
+
+use super::actor;
+use crate::random::Random;
+use crate::simulate::path::Path;
+use crate::simulate::scenario::{Actor, Class, Load, PoseMessages, Scene, Variant};
+use crate::simulate::scenery::Scenery;
+use crate::simulate::terrain::{Swell, Terrain};
+
+/// How far the street reaches to the north and to the south.
+const REACH_M: [f64; 2] = [-30.0, 100.0];
+/// From the middle of the street to the middle of what stands at the kerb, behind the pavement, and
+/// behind that.
+const KERB_M: f64 = 4.7;
+const BEHIND_M: f64 = 11.5;
+const FAR_M: f64 = 17.5;
+/// From the middle of the street to where people walk.
+const WALK_M: f64 = 7.5;
+/// Room along the street for what stands at the kerb and behind the pavement.
+const BAY_M: f64 = 6.2;
+
+pub(super) fn strangers(random: &mut Random) -> Scene {
+    build(random, true)
+}
+
+pub(super) fn furniture(random: &mut Random) -> Scene {
+    build(random, false)
+}
+
+/// Something between two bounds, all of it alike.
+fn between(random: &mut Random, low: f64, high: f64) -> f64 {
+    low + (high - low) * random.uniform()
+}
+
+/// Which of so many shares chance picks; none if it lies beyond them all.
+fn pick(random: &mut Random, shares: &[f64]) -> Option<usize> {
+    let mut left = random.uniform();
+    shares.iter().position(|share| {
+        left -= share;
+        left < 0.0
+    })
+}
+
+fn build(random: &mut Random, with_road_users: bool) -> Scene {
+    let swell = |random: &mut Random| {
+        let turn_rad = between(random, 0.0, std::f64::consts::TAU);
+        Swell {
+            direction: [libm::cos(turn_rad), libm::sin(turn_rad)],
+            from_m: between(random, -30.0, 50.0),
+            length_m: between(random, 15.0, 60.0),
+            rise_m: between(random, -1.5, 1.5),
+        }
+    };
+    let terrain = Terrain {
+        swells: (0..2).map(|_| swell(random)).collect(),
+        unevenness_m: between(random, 0.0, 0.03),
+    };
+    let mut scenery = Scenery::on(&terrain);
+    let mut actors = vec![];
+    for side in [-1.0, 1.0] {
+        if random.uniform() < 0.6 {
+            let middle_m = 0.5 * (REACH_M[0] + REACH_M[1]);
+            let sizes_m = [REACH_M[1] - REACH_M[0], 2.6];
+            scenery.pavement([side * WALK_M, middle_m], 90.0, sizes_m);
+        }
+        let mut along_m = REACH_M[0];
+        while along_m < REACH_M[1] {
+            let at_m = [side * KERB_M, along_m];
+            let is_taken = with_road_users && random.uniform() < 0.4;
+            if is_taken {
+                actors.push(parked(random, at_m));
+            } else {
+                stand_at_kerb(random, &mut scenery, at_m);
+            }
+            stand_behind(
+                random,
+                &mut scenery,
+                &mut actors,
+                with_road_users,
+                [side * BEHIND_M, along_m],
+            );
+            stand_far(random, &mut scenery, [side * FAR_M, along_m]);
+            // A long vehicle needs two bays.
+            let is_long = is_taken && actors.iter().any(|actor| is_long_near(actor, at_m));
+            along_m += if is_long { 13.0 } else { BAY_M };
+        }
+    }
+    if with_road_users {
+        add_traffic(random, &mut actors);
+    }
+    let speed_mps = if random.uniform() < 0.3 {
+        0.0
+    } else {
+        between(random, 1.0, 9.0)
+    };
+    Scene {
+        sensor_height_m: between(random, 1.2, 2.6),
+        ego: Path::from([1.75, 0.0], 90.0)
+            .line(400.0)
+            .timed(&[(0.0, speed_mps), (100.0, speed_mps)]),
+        poses: PoseMessages::None,
+        actors,
+        scenery,
+        terrain,
+        range_deviation_m: between(random, 0.008, 0.03),
+    }
+}
+
+fn is_long_near(actor: &Actor, [x, y]: [f64; 2]) -> bool {
+    let [actor_x, actor_y] = actor.path.at(0.0).position_m;
+    actor.variant.size_m[0] > 5.5 && actor_x == x && (actor_y - y).abs() < 5.0
+}
+
+/// A vehicle with paint and panes of its own.
+fn vehicle(random: &mut Random, variant: Variant) -> Variant {
+    let scale = between(random, 0.94, 1.06);
+    Variant {
+        size_m: variant.size_m.map(|metres| metres * scale),
+        reflectance: between(random, 0.04, 0.7),
+        glass: between(random, 0.2, 0.95),
+        ..variant
+    }
+}
+
+fn lorry(random: &mut Random) -> Variant {
+    let size_m = [
+        between(random, 5.8, 9.5),
+        between(random, 2.2, 2.5),
+        between(random, 2.5, 3.7),
+    ];
+    let own = Variant {
+        size_m,
+        ..Variant::lorry()
+    };
+    let reflectance = between(random, 0.1, 0.8);
+    Variant { reflectance, ..own }
+}
+
+fn parked(random: &mut Random, [x, y]: [f64; 2]) -> Actor {
+    let (variant, y) = match pick(random, &[0.8, 0.12, 0.03]) {
+        Some(0) => (Variant::car(random), y),
+        Some(1) => (lorry(random), y + 3.0),
+        Some(2) => (Variant::bus(), y + 4.0),
+        _ => (Variant::cyclist(random), y),
+    };
+    let variant = vehicle(random, variant);
+    let turn_deg = if random.uniform() < 0.5 { 90.0 } else { -90.0 };
+    let slant_deg = between(random, -4.0, 4.0);
+    actor(variant, Path::parked([x, y], turn_deg + slant_deg))
+}
+
+fn person(random: &mut Random) -> Variant {
+    let own = Variant::pedestrian(random);
+    // Children, too.
+    let scale = if random.uniform() < 0.15 {
+        between(random, 0.65, 0.9)
+    } else {
+        1.0
+    };
+    let load = match pick(random, &[0.1, 0.08, 0.08, 0.1, 0.05]) {
+        Some(0) => Load::Pack,
+        Some(1) => Load::Umbrella,
+        Some(2) => Load::Pram,
+        Some(3) => Load::Suitcase,
+        Some(4) => Load::Wheelchair,
+        _ => Load::None,
+    };
+    Variant {
+        size_m: own.size_m.map(|metres| metres * scale),
+        load,
+        ..own
+    }
+}
+
+fn stand_at_kerb(random: &mut Random, scenery: &mut Scenery, [x, y]: [f64; 2]) {
+    let turn_deg = between(random, 0.0, 180.0);
+    match pick(random, &[0.12, 0.12, 0.1, 0.06, 0.06, 0.08, 0.05]) {
+        Some(0) => {
+            let radius_m = between(random, 0.05, 0.2);
+            let high_m = between(random, 2.5, 7.0);
+            scenery.pole([x, y], radius_m, high_m);
+        }
+        Some(1) => {
+            for bin in 0..1 + random.below(4) {
+                let sizes_m = [between(random, 0.45, 1.3), between(random, 0.5, 1.0)];
+                let high_m = between(random, 0.9, 1.4);
+                scenery.cabinet([x, y + 1.4 * bin as f64], 90.0, sizes_m, high_m);
+            }
+        }
+        Some(2) => {
+            scenery.sign([x, y], turn_deg);
+        }
+        Some(3) => {
+            for bollard in 0..3 {
+                let radius_m = between(random, 0.05, 0.12);
+                let high_m = between(random, 0.6, 1.1);
+                scenery.pole([x, y + 1.5 * f64::from(bollard)], radius_m, high_m);
+            }
+        }
+        Some(4) => {
+            let radius_m = between(random, 0.3, 0.8);
+            let high_m = between(random, 0.5, 1.8);
+            scenery.bush([x, y], radius_m, high_m);
+        }
+        Some(5) => {
+            let crown_m = between(random, 1.0, 2.5);
+            scenery.tree([x, y], crown_m);
+        }
+        Some(6) => {
+            let length_m = between(random, 1.5, 5.5);
+            scenery.rail([x, y], 90.0, length_m);
+        }
+        _ => {}
+    }
+}
+
+fn stand_behind(
+    random: &mut Random,
+    scenery: &mut Scenery,
+    actors: &mut Vec<Actor>,
+    with_road_users: bool,
+    [x, y]: [f64; 2],
+) {
+    let slant_deg = between(random, 80.0, 100.0);
+    let length_m = between(random, 2.0, 5.8);
+    match pick(random, &[0.2, 0.14, 0.08, 0.1, 0.1, 0.08, 0.1, 0.1]) {
+        Some(0) => {
+            let high_m = between(random, 0.7, 2.4);
+            scenery.hedge([x, y], slant_deg, length_m, high_m);
+        }
+        Some(1) => {
+            let high_m = between(random, 0.5, 2.6);
+            scenery.wall([x, y], slant_deg, length_m, high_m);
+        }
+        Some(2) => {
+            let high_m = between(random, 0.8, 2.2);
+            let open = between(random, 0.3, 0.9);
+            scenery.fence([x, y], slant_deg, length_m, high_m, open);
+        }
+        Some(3) => {
+            let crown_m = between(random, 1.0, 2.2);
+            scenery.tree([x, y], crown_m);
+        }
+        Some(4) => {
+            for _ in 0..1 + random.below(3) {
+                let at_m = [
+                    x + between(random, -1.5, 1.5),
+                    y + between(random, -2.0, 2.0),
+                ];
+                let radius_m = between(random, 0.3, 1.2);
+                let high_m = between(random, 0.5, 2.3);
+                scenery.bush(at_m, radius_m, high_m);
+            }
+        }
+        // Transformer stations, kiosks, containers, sheds: some are as large as vehicles.
+        Some(5) => {
+            let sizes_m = [between(random, 0.8, 5.5), between(random, 0.5, 2.4)];
+            let high_m = between(random, 1.0, 2.8);
+            scenery.cabinet([x, y], slant_deg, sizes_m, high_m);
+        }
+        Some(6) if with_road_users => {
+            let variant = Variant::car(random);
+            let variant = vehicle(random, variant);
+            let yaw_deg = between(random, -10.0, 10.0);
+            actors.push(actor(variant, Path::parked([x, y], yaw_deg)));
+        }
+        Some(7) if with_road_users => {
+            for number in 0..1 + random.below(3) {
+                let place_m = [x + between(random, -0.4, 0.4), y + 1.1 * number as f64];
+                let yaw_deg = between(random, -180.0, 180.0);
+                actors.push(actor(person(random), Path::parked(place_m, yaw_deg)));
+            }
+        }
+        _ => {}
+    }
+}
+
+fn stand_far(random: &mut Random, scenery: &mut Scenery, [x, y]: [f64; 2]) {
+    let across_m = between(random, 4.0, 6.0);
+    match pick(random, &[0.4, 0.15, 0.15, 0.1]) {
+        Some(0) => {
+            let high_m = between(random, 2.5, 9.0);
+            scenery.house([x, y], 90.0, [BAY_M, across_m], high_m);
+        }
+        Some(1) => {
+            let high_m = between(random, 0.8, 3.0);
+            scenery.wall([x, y], 90.0, BAY_M, high_m);
+        }
+        Some(2) => {
+            let high_m = between(random, 0.8, 3.0);
+            scenery.hedge([x, y], 90.0, BAY_M, high_m);
+        }
+        Some(3) => {
+            let crown_m = between(random, 1.5, 3.0);
+            scenery.tree([x, y], crown_m);
+        }
+        _ => {}
+    }
+}
+
+/// One lane of oncoming vehicles, and people on both pavements, all of a row at one speed.
+fn add_traffic(random: &mut Random, actors: &mut Vec<Actor>) {
+    let speed_mps = between(random, 3.0, 12.0);
+    for number in 0..5 {
+        let variant = match pick(random, &[0.5, 0.15, 0.05]) {
+            Some(0) => Variant::car(random),
+            Some(1) => lorry(random),
+            Some(2) => Variant::bus(),
+            _ => Variant::cyclist(random),
+        };
+        let begin_m = [
+            -1.75,
+            20.0 + 28.0 * f64::from(number) + between(random, 0.0, 8.0),
+        ];
+        let speed_mps = if variant.class == Class::Cyclist {
+            speed_mps.min(8.0)
+        } else {
+            speed_mps
+        };
+        let variant = vehicle(random, variant);
+        let path = Path::straight(begin_m, -90.0, speed_mps);
+        let is_behind_slow = actors.last().is_some_and(|last| {
+            last.path.at(1.0).speed_mps > 0.0 && last.path.at(1.0).speed_mps < speed_mps
+        });
+        if !is_behind_slow {
+            actors.push(actor(variant, path));
+        }
+    }
+    for side in [-1.0, 1.0] {
+        for (lane_m, yaw_deg) in [(0.6, 90.0), (-0.7, -90.0)] {
+            let speed_mps = between(random, 0.5, 1.9);
+            let mut along_m = between(random, -20.0, 10.0);
+            while along_m < 70.0 {
+                let x = side * WALK_M + lane_m + between(random, -0.1, 0.1);
+                let path = Path::straight([x, along_m], yaw_deg, speed_mps);
+                actors.push(actor(person(random), path));
+                along_m += between(random, 4.0, 30.0);
+            }
+        }
+    }
+}
