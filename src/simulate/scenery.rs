@@ -182,6 +182,12 @@ impl Scenery {
         )
     }
 
+    /// A ceiling, as of a hall or below a bridge.
+    pub(super) fn ceiling(&mut self, at_m: [f64; 2], sizes_m: [f64; 2], above_m: f64) -> &mut Self {
+        let heights = [above_m, above_m + 0.3];
+        self.bar(at_m, 0.0, sizes_m, heights, Fabric::Dense, 0.4)
+    }
+
     pub(super) fn bush(&mut self, at_m: [f64; 2], radius_m: f64, high_m: f64) -> &mut Self {
         self.drum(at_m, radius_m, [0.0, high_m], Fabric::Leaves(0.3), 0.4)
     }

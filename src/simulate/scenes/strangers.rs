@@ -86,14 +86,20 @@ fn build(random: &mut Random, with_road_users: bool) -> Scene {
             along_m += if is_long { 13.0 } else { BAY_M };
         }
     }
-    if with_road_users {
-        add_traffic(random, &mut actors);
-    }
-    let speed_mps = if random.uniform() < 0.3 {
+    let speed_mps = if random.uniform() < 0.4 {
         0.0
     } else {
         between(random, 1.0, 9.0)
     };
+    if with_road_users {
+        add_traffic(random, &mut actors);
+        add_column(random, &mut actors, speed_mps);
+    }
+    if random.uniform() < 0.15 {
+        let middle_m = 0.5 * (REACH_M[0] + REACH_M[1]);
+        let above_m = between(random, 3.5, 6.0);
+        scenery.ceiling([0.0, middle_m], [40.0, REACH_M[1] - REACH_M[0]], above_m);
+    }
     Scene {
         sensor_height_m: between(random, 1.2, 2.6),
         ego: Path::from([1.75, 0.0], 90.0)
@@ -262,7 +268,8 @@ fn stand_behind(
         Some(6) if with_road_users => {
             let variant = Variant::car(random);
             let variant = vehicle(random, variant);
-            let yaw_deg = between(random, -10.0, 10.0);
+            let yaw_deg =
+                between(random, -10.0, 10.0) + if random.uniform() < 0.5 { 180.0 } else { 0.0 };
             actors.push(actor(variant, Path::parked([x, y], yaw_deg)));
         }
         Some(7) if with_road_users => {
@@ -296,6 +303,32 @@ fn stand_far(random: &mut Random, scenery: &mut Scenery, [x, y]: [f64; 2]) {
             scenery.tree([x, y], crown_m);
         }
         _ => {}
+    }
+}
+
+/// Vehicles ahead and behind in the lane, as fast as the sensor's: a queue, or traffic that flows.
+fn add_column(random: &mut Random, actors: &mut Vec<Actor>, speed_mps: f64) {
+    for direction in [1.0, -1.0] {
+        let mut along_m = between(random, 7.0, 30.0);
+        for _ in 0..random.below(4) {
+            let variant = match pick(random, &[0.75, 0.17, 0.04]) {
+                Some(0) => Variant::car(random),
+                Some(1) => lorry(random),
+                Some(2) => Variant::bus(),
+                _ => Variant::cyclist(random),
+            };
+            let variant = vehicle(random, variant);
+            along_m += 0.5 * variant.size_m[0];
+            let at_m = [1.75 + between(random, -0.3, 0.3), direction * along_m];
+            let slant_deg = between(random, -3.0, 3.0);
+            let path = if speed_mps > 0.0 {
+                Path::straight(at_m, 90.0, speed_mps)
+            } else {
+                Path::parked(at_m, 90.0 + slant_deg)
+            };
+            actors.push(actor(variant, path));
+            along_m += 0.5 * variant.size_m[0] + between(random, 2.0, 14.0);
+        }
     }
 }
 
