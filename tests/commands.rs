@@ -361,3 +361,67 @@ fn scenarios_are_listed() {
     assert_eq!(code(&listed), 0);
     assert!(String::from_utf8_lossy(&listed.stdout).starts_with("roundabout: "));
 }
+
+#[test]
+fn a_capture_is_read_like_a_recording_of_its_whole_revolutions() {
+    let Some(capture) = common::data("vlp16-sampleShort.pcap") else {
+        return;
+    };
+    let (folder, capture) = (Folder::new(), capture.to_str().unwrap());
+    let converted = folder.text("converted.rec");
+    assert_eq!(code(&kreisel(&["convert", capture, &converted])), 3);
+    // The device service sends the end of a turn as if it were one; what reads packets leaves it out.
+    let bytes = std::fs::read(&converted).unwrap();
+    let first = Recording::new(&bytes).next().unwrap().unwrap().frame.len();
+    let whole = folder.write("whole.rec", &bytes[first..]);
+    let (of_capture, of_recording) = (folder.text("a.jsonl"), folder.text("b.jsonl"));
+    let output = kreisel(&["process", capture, "--objects", &of_capture]);
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("3 answered, 0 refused"), "{text}");
+    // Its last record is cut off, and that is said.
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    assert!(stderr(&output).contains("the last record is cut off"));
+    assert_eq!(
+        code(&kreisel(&["process", &whole, "--objects", &of_recording])),
+        0
+    );
+    let [a, b] = [of_capture, of_recording].map(|path| std::fs::read(path).unwrap());
+    assert_eq!(a, b);
+    let inspected = kreisel(&["inspect", "--json", capture]);
+    let report: Value = serde_json::from_slice(&inspected.stdout).unwrap();
+    assert_eq!(report["envelopes"], 3);
+}
+
+#[test]
+fn without_an_output_file_it_is_told_what_was_seen() {
+    let folder = Folder::new();
+    let recording = folder.text("drive.rec");
+    let simulate = [
+        "simulate",
+        "roundabout-waiting",
+        "--duration=4",
+        "--output",
+        &recording,
+    ];
+    assert_eq!(code(&kreisel(&simulate)), 0);
+    let output = kreisel(&["process", &recording]);
+    let text = String::from_utf8_lossy(&output.stdout);
+    for told in [
+        "car=3",
+        "cyclist=3",
+        "most in revolution",
+        "ms a revolution",
+        "kreisel view",
+    ] {
+        assert!(text.contains(told), "{told}: {text}");
+    }
+    let published = folder.text("published.rec");
+    let quiet = kreisel(&["process", &recording, "--output", &published]);
+    assert_eq!(String::from_utf8_lossy(&quiet.stdout).lines().count(), 1);
+    let inspected = kreisel(&["inspect", &published]);
+    let text = String::from_utf8_lossy(&inspected.stdout);
+    assert!(
+        text.contains("kreisel.GridTile") && !text.contains("unknown"),
+        "{text}"
+    );
+}

@@ -7,12 +7,36 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, anyhow, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::Completion;
+use super::capture::{self, Capture};
 use crate::config::{Configuration, text};
 use crate::wire::recording::Damage;
 
 /// A whole file.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
     std::fs::read(path).with_context(|| path.display().to_string())
+}
+
+/// A recording as a whole, or the whole revolutions of a capture of VLP-16 packets, found from its
+/// first bytes; and whether parts of a capture could not be read, which is then said.
+pub(super) fn read_recording(path: &Path) -> Result<(Vec<u8>, Completion)> {
+    let bytes = read(path)?;
+    if !capture::is_capture(&bytes) {
+        return Ok((bytes, Completion::Done));
+    }
+    let capture = Capture::read(&bytes, 0, &progress(bytes.len(), "bytes"));
+    if capture.packets == 0 {
+        let nothing = || "byte 0: no VLP-16 data packets".into();
+        let problem = capture.damage.unwrap_or_else(nothing);
+        bail!("{}: {problem}", path.display());
+    }
+    capture.warn(path);
+    let completion = if capture.is_damaged() {
+        Completion::Damaged
+    } else {
+        Completion::Done
+    };
+    Ok((capture.whole_revolutions(), completion))
 }
 
 /// The configuration in a file, or the default one.

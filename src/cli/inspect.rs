@@ -19,7 +19,7 @@ use crate::wire::{Recording, known_name};
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Recording to look into.
-    #[arg(value_name = "FILE.rec")]
+    #[arg(value_name = "FILE")]
     input: PathBuf,
     /// As JSON.
     #[arg(long)]
@@ -90,7 +90,7 @@ struct DamageReport {
 const MOST_CLOUD_LINES: usize = 20;
 
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
-    let bytes = files::read(&arguments.input)?;
+    let (bytes, completion) = files::read_recording(&arguments.input)?;
     let report = inspect(&bytes);
     if arguments.json {
         say!("{}", serde_json::to_string_pretty(&report)?);
@@ -105,7 +105,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
         );
     }
     if report.damage.is_empty() {
-        Ok(Completion::Done)
+        Ok(completion)
     } else {
         Ok(Completion::Damaged)
     }

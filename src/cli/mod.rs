@@ -16,6 +16,8 @@ macro_rules! tell {
     }};
 }
 
+mod capture;
+
 mod config;
 
 mod convert;
@@ -47,6 +49,8 @@ mod run;
 mod score;
 
 mod simulate;
+
+mod summary;
 
 mod view;
 

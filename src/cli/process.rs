@@ -8,6 +8,7 @@ use clap::Args;
 use super::files::Output;
 use super::labels::LabelWriter;
 use super::score::Score;
+use super::summary::Summary;
 use super::{Completion, files, map, objects};
 use crate::pipeline::{Fault, Outcome, Pipeline, RevolutionReport};
 use crate::tally::Tally;
@@ -18,8 +19,8 @@ use crate::wire::{Envelope, Recording};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Recording to perceive.
-    #[arg(value_name = "IN.rec")]
+    /// Recording or capture (pcap, pcapng) to perceive.
+    #[arg(value_name = "IN")]
     input: PathBuf,
     /// Recording of what `kreisel run` would multicast.
     #[arg(long, value_name = "OUT.rec")]
@@ -61,6 +62,7 @@ struct Process<'a> {
     trajectory: Option<Output>,
     labels: Option<LabelWriter>,
     score: Option<Score>,
+    summary: Option<Summary>,
     frame: Vec<u8>,
     status_due: Option<Time>,
     faults: Tally,
@@ -69,7 +71,7 @@ struct Process<'a> {
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let mut configuration = files::configuration(arguments.config.as_deref())?;
     configuration.ego.use_poses &= !arguments.no_poses;
-    let bytes = files::read(&arguments.input)?;
+    let (bytes, completion) = files::read_recording(&arguments.input)?;
     let outputs = [
         &arguments.output,
         &arguments.objects,
@@ -81,6 +83,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     if let Some(truth) = &arguments.truth {
         files::check_distinct(truth, &outputs.map(Option::as_ref))?;
     }
+    let asks_nothing = arguments.truth.is_none() && outputs.iter().all(|output| output.is_none());
     let mut process = Process {
         arguments,
         score: arguments.truth.as_deref().map(Score::read).transpose()?,
@@ -93,12 +96,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
             .as_deref()
             .map(LabelWriter::create)
             .transpose()?,
+        summary: asks_nothing.then(Summary::new),
         frame: vec![],
         status_due: None,
         faults: Tally::default(),
     };
     let bar = files::progress(bytes.len(), "bytes");
-    let mut damages = 0;
+    let mut damages = usize::from(completion == Completion::Damaged);
     for item in Recording::new(&bytes) {
         match item {
             Ok(entry) => {
@@ -162,6 +166,9 @@ impl Process<'_> {
         if let Some(score) = &mut self.score {
             score.take(report, self.pipeline.objects());
         }
+        if let Some(summary) = &mut self.summary {
+            summary.take(report, self.pipeline.objects());
+        }
         if let Some(labels) = &mut self.labels {
             labels.put_perceived(&self.pipeline, report.number)?;
         }
@@ -213,6 +220,9 @@ impl Process<'_> {
         );
         if let Some(score) = &self.score {
             say!("{}", score.summary());
+        }
+        if let Some(summary) = &self.summary {
+            summary.print(&self.arguments.input)?;
         }
         if self.faults.total() > 0 {
             tell!(

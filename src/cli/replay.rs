@@ -17,8 +17,8 @@ use crate::wire::recording::Entry;
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Recording to play.
-    #[arg(value_name = "FILE.rec")]
+    /// Recording or capture (pcap, pcapng) to play.
+    #[arg(value_name = "FILE")]
     input: PathBuf,
     #[command(flatten)]
     session: SessionArguments,
@@ -73,8 +73,8 @@ async fn simulate(arguments: &Arguments, scenario: &Scenario) -> Result<()> {
 }
 
 fn replay(arguments: &Arguments) -> Result<Completion> {
-    let bytes = files::read(&arguments.input)?;
-    let (mut entries, mut completion) = (vec![], Completion::Done);
+    let (bytes, mut completion) = files::read_recording(&arguments.input)?;
+    let mut entries = vec![];
     for item in Recording::new(&bytes) {
         match item {
             Ok(entry) if entry.frame.len() > MAX_DATAGRAM_LEN => {

@@ -24,8 +24,8 @@ use crate::wire::{Envelope, Message, Recording};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Recording to play.
-    #[arg(value_name = "FILE.rec", required_unless_present = "cid")]
+    /// Recording or capture (pcap, pcapng) to play.
+    #[arg(value_name = "FILE", required_unless_present = "cid")]
     input: Option<PathBuf>,
     /// Session to watch: what a daemon in it publishes.
     #[arg(long, value_name = "N", conflicts_with = "input", value_parser = clap::value_parser!(u8).range(1..=254))]
@@ -74,8 +74,8 @@ fn serve(address: SocketAddr) -> Result<(Feed, mpsc::Receiver<Control>)> {
 
 fn play(arguments: &Arguments, path: &Path) -> Result<Completion> {
     let configuration = files::configuration(arguments.config.as_deref())?;
-    let bytes = files::read(path)?;
-    let (mut entries, mut completion) = (vec![], Completion::Done);
+    let (bytes, mut completion) = files::read_recording(path)?;
+    let mut entries = vec![];
     for item in Recording::new(&bytes) {
         match item {
             Ok(entry) => entries.push(entry),

@@ -57,6 +57,7 @@ pub fn known_name(data_type: i32) -> Option<&'static str> {
         pose::SimulationFrame,
         object_list::Object,
         object_list::ObjectList,
+        grid_tile::GridTile,
         status::Status,
         opendlv::ObjectFrameStart,
         opendlv::ObjectFrameEnd,
