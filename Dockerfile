@@ -4,6 +4,7 @@ WORKDIR /build
 COPY Cargo.toml Cargo.lock ./
 COPY src src
 COPY benches benches
+COPY examples examples
 # Linking libc statically needs the target to be named, whichever it is.
 RUN target="$(rustc -vV | sed -n 's/host: //p')" \
     && RUSTFLAGS="-C target-feature=+crt-static" \

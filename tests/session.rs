@@ -554,3 +554,17 @@ fn the_demo_shows_objects_and_ends_by_itself() {
         assert!(shown.lines().count() > 10, "{shown}");
     });
 }
+
+#[test]
+fn the_examples_print_what_a_daemon_sends() {
+    in_namespace(|| {
+        let demo = Running::kreisel(&["demo", "--duration=6", "--cid=112"]);
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/subscribe.py");
+        let example = Running::start("python3", &[script, "112", "127.0.0.1"]);
+        demo.output();
+        example.signal(Signal::SIGTERM);
+        let (_, shown, log) = example.output();
+        assert!(shown.contains("revolution 40: 7 objects"), "{shown}{log}");
+        assert!(shown.contains("  pedestrian "), "{shown}{log}");
+    });
+}

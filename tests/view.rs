@@ -176,6 +176,30 @@ fn the_demo_serves_a_page_and_a_picture_of_every_revolution() {
 }
 
 #[test]
+fn a_machine_reads_counters_and_health() {
+    let demo = Served::demo("237");
+    assert!(demo.get("/health").starts_with("HTTP/1.1 503"));
+    std::thread::sleep(Duration::from_millis(2500));
+    assert!(
+        demo.get("/health").starts_with("HTTP/1.1 200"),
+        "{}",
+        demo.get("/health")
+    );
+    let metrics = demo.get("/metrics");
+    let value = |name: &str| -> f64 {
+        let mut lines = metrics.lines();
+        let line = lines.find_map(|line| line.strip_prefix(name)).expect(name);
+        line.trim().parse().unwrap()
+    };
+    assert!(
+        value("kreisel_revolutions_published_total ") > 5.0,
+        "{metrics}"
+    );
+    assert_eq!(value("kreisel_revolutions_queue_dropped_total "), 0.0);
+    assert!(value("kreisel_latency_seconds{quantile=\"0.5\"} ") > 0.0);
+}
+
+#[test]
 fn a_page_from_elsewhere_sees_nothing() {
     let demo = Served::demo("232");
     let Err(Error::Http(answer)) = demo.watch_from("http://elsewhere.example") else {

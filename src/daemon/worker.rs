@@ -144,6 +144,9 @@ impl<'a> Worker<'a> {
         status.latency_max = latency.max_s;
         status.receive_buffer = self.receive_buffer as u32;
         status.healthy = self.vitals.verdict().is_ok();
+        if let Some(view) = &mut self.view {
+            view.tell(&status);
+        }
         let sent = now();
         let postmark = Postmark {
             sent,

@@ -6,11 +6,13 @@ use std::time::Instant;
 use axum::body::Bytes;
 use tokio::sync::watch;
 
+use super::metrics::Told;
 use super::picture::{Around, Painter, Player};
 use crate::pipeline::{Pipeline, RevolutionReport, Step};
 use crate::time::Time;
 use crate::wire::Message;
 use crate::wire::envelope::Postmark;
+use crate::wire::status::Status;
 
 /// The newest picture.
 #[derive(Debug, Clone, Default)]
@@ -25,6 +27,7 @@ pub(super) struct Shown {
 pub struct Feed {
     address: SocketAddr,
     shown: watch::Sender<Shown>,
+    told: watch::Sender<Option<Told>>,
     painter: Painter,
     begun: Option<Instant>,
     steps_ms: Vec<(&'static str, f32)>,
@@ -36,10 +39,15 @@ pub struct Feed {
 const MOST_FRAME_BYTES: usize = 1 << 20;
 
 impl Feed {
-    pub(super) fn new(address: SocketAddr, shown: watch::Sender<Shown>) -> Self {
+    pub(super) fn new(
+        address: SocketAddr,
+        shown: watch::Sender<Shown>,
+        told: watch::Sender<Option<Told>>,
+    ) -> Self {
         Self {
             address,
             shown,
+            told,
             painter: Painter::default(),
             begun: None,
             steps_ms: vec![],
@@ -55,6 +63,14 @@ impl Feed {
     /// Whether anybody looks.
     pub fn is_watched(&self) -> bool {
         self.shown.receiver_count() > 0
+    }
+
+    /// How the daemon is doing, for those who ask.
+    pub fn tell(&mut self, status: &Status) {
+        self.told.send_replace(Some(Told {
+            status: status.clone(),
+            at: Instant::now(),
+        }));
     }
 
     /// A revolution begins.

@@ -1,11 +1,14 @@
 //! The picture in a browser: points, objects and map of the last revolution, for anybody who looks.
 //!
 //! `picture` has the bytes of a revolution for the page, `feed` makes them where somebody looks,
-//! `server` serves the page and sends them, `page/` is the page. The server has a thread of its
+//! `server` serves the page and sends them, `page/` is the page, and `metrics` is for those who watch a daemon by
+//! machine. The server has a thread of its
 //! own, and between it and the pipeline stands one picture, the newest: a viewer that stalls
 //! misses pictures, and nothing else happens.
 
 mod feed;
+
+mod metrics;
 
 mod picture;
 

@@ -21,6 +21,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, watch};
 use tokio::time::timeout;
 
 use super::feed::{Feed, Shown};
+use super::metrics::{self, Told};
 use super::picture;
 
 /// Where the view is served if nothing else is said: for this host only.
@@ -58,6 +59,7 @@ pub enum Control {
 #[derive(Clone)]
 struct Served {
     shown: watch::Sender<Shown>,
+    told: watch::Sender<Option<Told>>,
     controls: mpsc::Sender<Control>,
     viewers: Arc<Semaphore>,
     is_local: bool,
@@ -78,8 +80,10 @@ pub fn serve(address: SocketAddr) -> io::Result<(Feed, mpsc::Receiver<Control>)>
         .build()?;
     let shown = watch::Sender::new(Shown::default());
     let (controls, asked) = mpsc::channel(MOST_CONTROLS);
+    let told = watch::Sender::new(None);
     let served = Served {
         shown: shown.clone(),
+        told: told.clone(),
         controls,
         viewers: Arc::new(Semaphore::new(MOST_VIEWERS)),
         is_local: address.ip().is_loopback(),
@@ -96,7 +100,7 @@ pub fn serve(address: SocketAddr) -> io::Result<(Feed, mpsc::Receiver<Control>)>
     std::thread::Builder::new()
         .name("view".into())
         .spawn(serve)?;
-    Ok((Feed::new(address, shown), asked))
+    Ok((Feed::new(address, shown, told), asked))
 }
 
 /// A listener that takes so many connections at a time.
@@ -201,7 +205,29 @@ fn router(served: Served) -> Router {
             ];
             router.route(path, get(move || async move { (headers, *text) }))
         });
-    files.route("/pictures", get(pictures)).with_state(served)
+    files
+        .route("/pictures", get(pictures))
+        .route("/metrics", get(metrics))
+        .route("/health", get(health))
+        .with_state(served)
+}
+
+/// What Prometheus asks for; nothing where no daemon tells its Status.
+async fn metrics(State(served): State<Served>) -> Response {
+    let told = served.told.borrow().clone();
+    let text = told
+        .map(|told| metrics::text(&told.status))
+        .unwrap_or_default();
+    ([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], text).into_response()
+}
+
+/// The same as `kreisel health` says.
+async fn health(State(served): State<Served>) -> Response {
+    let told = served.told.borrow().clone();
+    match metrics::health(told.as_ref()) {
+        Ok(()) => "ok".into_response(),
+        Err(why) => (StatusCode::SERVICE_UNAVAILABLE, why).into_response(),
+    }
 }
 
 /// Opens the stream of pictures.
