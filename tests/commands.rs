@@ -61,6 +61,7 @@ fn payloads(bytes: &[u8]) -> Vec<Envelope<'_>> {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn every_complete_revolution_of_a_real_drive_gives_a_list_above_a_road_1_6_m_below() {
     let Some(input) = common::data("vlp16-sampleShort.rec") else {
         return;
@@ -152,6 +153,7 @@ fn process_gives_the_same_bytes_twice_and_one_list_a_revolution() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn convert_gives_the_bytes_of_the_device_service() {
     let (Some(capture), Some(golden)) = (
         common::data("vlp16-sampleShort.pcap"),
@@ -183,6 +185,7 @@ fn convert_gives_the_bytes_of_the_device_service() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn captures_of_other_sensors_and_links_convert_too() {
     for (name, columns) in [
         ("vlp16-mrpt-indoor.pcap", 1811),
@@ -207,6 +210,7 @@ fn captures_of_other_sensors_and_links_convert_too() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn inspect_says_what_the_array_cannot_hold() {
     for (name, reason) in [
         ("hdl32e-synthetic.rec", "12 of the 32 layers of a HDL-32E"),
@@ -363,6 +367,7 @@ fn scenarios_are_listed() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_capture_is_read_like_a_recording_of_its_whole_revolutions() {
     let Some(capture) = common::data("vlp16-sampleShort.pcap") else {
         return;

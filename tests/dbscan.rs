@@ -300,6 +300,7 @@ fn runs_that_lead_away_from_the_sensor_are_joined_as_defined() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_real_revolution_is_clustered_as_defined() {
     let Some(path) = common::data("vlp16-sampleShort.rec") else {
         return;

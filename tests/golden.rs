@@ -551,6 +551,7 @@ fn check_object_seven(envelope: &Envelope<'_>) {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn the_odd_datagrams_are_the_twelve_that_are_tested_here() {
     let Some(edge_cases) = json("edge.json") else {
         return;
@@ -583,6 +584,7 @@ fn the_odd_datagrams_are_the_twelve_that_are_tested_here() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_datagram_without_the_magic_is_refused() {
     let Some(datagram) = edge("bad_magic") else {
         return;
@@ -592,6 +594,7 @@ fn a_datagram_without_the_magic_is_refused() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_datagram_shorter_than_its_length_field_is_refused() {
     let Some(datagram) = edge("short_datagram") else {
         return;
@@ -606,6 +609,7 @@ fn a_datagram_shorter_than_its_length_field_is_refused() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_header_with_length_zero_is_an_envelope_of_data_type_zero() {
     let Some(datagram) = edge("header_only_len0") else {
         return;
@@ -617,6 +621,7 @@ fn a_header_with_length_zero_is_an_envelope_of_data_type_zero() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn bytes_after_the_first_envelope_are_counted_and_not_read() {
     for (name, rest_len) in [("trailing_bytes", 4), ("two_envelopes_one_datagram", 51)] {
         let Some(datagram) = edge(name) else { return };
@@ -627,6 +632,7 @@ fn bytes_after_the_first_envelope_are_counted_and_not_read() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn two_envelopes_of_a_datagram_are_two_entries_of_a_recording() {
     let Some(datagram) = edge("two_envelopes_one_datagram") else {
         return;
@@ -642,6 +648,7 @@ fn two_envelopes_of_a_datagram_are_two_entries_of_a_recording() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn an_envelope_with_nothing_but_a_data_type_is_accepted() {
     let Some(datagram) = edge("only_datatype") else {
         return;
@@ -654,6 +661,7 @@ fn an_envelope_with_nothing_but_a_data_type_is_accepted() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn the_last_of_two_data_types_wins_in_any_order_of_fields() {
     let Some(datagram) = edge("duplicate_datatype") else {
         return;
@@ -664,6 +672,7 @@ fn the_last_of_two_data_types_wins_in_any_order_of_fields() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn unknown_fields_and_keys_without_content_are_passed_over() {
     for (name, sender_stamp) in [("unknown_fields", 0), ("group_wire_types", 7)] {
         let Some(datagram) = edge(name) else { return };
@@ -681,6 +690,7 @@ fn unknown_fields_and_keys_without_content_are_passed_over() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_varint_of_twelve_bytes_is_refused() {
     let Some(datagram) = edge("varint_12_bytes") else {
         return;
@@ -690,6 +700,7 @@ fn a_varint_of_twelve_bytes_is_refused() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn an_inner_length_past_the_envelope_is_refused_whatever_its_size() {
     let cases = [
         ("inner_length_beyond_envelope", 1000),
@@ -749,6 +760,7 @@ fn check_dvnode(envelope: &Envelope<'_>) {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn the_point_cloud_of_the_thesis_simulation_is_read_in_little_endian() {
     let Some(frame) = bytes("legacy/dvnode_cpc_49_le.bin") else {
         return;
@@ -764,6 +776,7 @@ fn the_point_cloud_of_the_thesis_simulation_is_read_in_little_endian() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn the_point_cloud_of_opendavinci_before_2017_is_read_in_little_endian() {
     const YEAR_2016: std::ops::Range<i32> = 1_451_606_400..1_483_228_800;
     let Some(frame) = bytes("legacy/od4_2016_cpc_49_le.bin") else {
@@ -776,6 +789,7 @@ fn the_point_cloud_of_opendavinci_before_2017_is_read_in_little_endian() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn the_pose_of_the_thesis_simulation_has_its_four_values_and_no_others() {
     let Some(frame) = bytes("legacy/dvnode_grp1data_533.bin") else {
         return;
@@ -794,6 +808,7 @@ fn the_pose_of_the_thesis_simulation_has_its_four_values_and_no_others() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn the_session_of_the_thesis_simulation_holds_both_of_its_messages() {
     let Some(session) = bytes("legacy/dvnode_session.rec") else {
         return;
@@ -812,6 +827,7 @@ fn the_session_of_the_thesis_simulation_holds_both_of_its_messages() {
 const TEST_RECORDING: &str = "legacy/OpenDaVINCITestData-recording.rec";
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn the_test_recording_of_opendavinci_has_five_envelopes_without_times() {
     let Some(recording) = bytes(TEST_RECORDING) else {
         return;
@@ -829,6 +845,7 @@ fn the_test_recording_of_opendavinci_has_five_envelopes_without_times() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn the_test_recording_of_opendavinci_holds_its_scalars_and_lists() {
     let Some(recording) = bytes(TEST_RECORDING) else {
         return;
@@ -870,6 +887,7 @@ const TEST_MESSAGES: &str = r#"{
 }"#;
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn every_listed_recording_holds_the_listed_revolutions() {
     let Some(listed) = json("revolutions.json") else {
         return;

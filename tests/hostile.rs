@@ -252,6 +252,7 @@ fn insert(random: &mut Random, bytes: &mut Vec<u8>) {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn ten_thousand_mutations_are_counted_and_good_revolutions_between_them_answered() {
     let Some(recording) = bytes(REVOLUTIONS) else {
         return;
@@ -280,6 +281,7 @@ fn ten_thousand_mutations_are_counted_and_good_revolutions_between_them_answered
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_fault_costs_no_good_revolution_and_a_mutant_that_passes_at_most_one() {
     let Some(recording) = bytes(REVOLUTIONS) else {
         return;
@@ -307,6 +309,7 @@ fn a_fault_costs_no_good_revolution_and_a_mutant_that_passes_at_most_one() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_burst_of_mutants_delays_good_revolutions_by_a_few() {
     let Some(recording) = bytes(REVOLUTIONS) else {
         return;
@@ -327,6 +330,7 @@ fn a_burst_of_mutants_delays_good_revolutions_by_a_few() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn bytes_of_no_meaning_do_no_harm_as_any_message() {
     let Some(recording) = bytes(REVOLUTIONS) else {
         return;
@@ -349,6 +353,7 @@ fn bytes_of_no_meaning_do_no_harm_as_any_message() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn another_sender_is_followed_after_twenty_refusals_and_the_first_welcome_back_at_once() {
     let Some(recording) = bytes(REVOLUTIONS) else {
         return;
@@ -363,6 +368,7 @@ fn another_sender_is_followed_after_twenty_refusals_and_the_first_welcome_back_a
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_hostile_first_sender_keeps_the_good_one_waiting_no_longer_than_its_patience() {
     let Some(recording) = bytes(REVOLUTIONS) else {
         return;
@@ -375,6 +381,7 @@ fn a_hostile_first_sender_keeps_the_good_one_waiting_no_longer_than_its_patience
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_refused_first_message_does_not_decide_who_is_listened_to() {
     let Some(recording) = bytes(REVOLUTIONS) else {
         return;
@@ -398,6 +405,7 @@ fn with_end_azimuth(payload: &[u8], end_azimuth_deg: f32) -> Vec<u8> {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_leap_in_time_costs_no_revolution() {
     let Some(recording) = bytes(REVOLUTIONS) else {
         return;
@@ -415,6 +423,7 @@ fn a_leap_in_time_costs_no_revolution() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_sample_time_a_little_ahead_costs_one_revolution() {
     let Some(recording) = bytes(REVOLUTIONS) else {
         return;
@@ -431,6 +440,7 @@ fn a_sample_time_a_little_ahead_costs_one_revolution() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_sample_time_that_a_later_revolution_shares_costs_one_revolution() {
     let Some(recording) = bytes(REVOLUTIONS) else {
         return;
@@ -444,6 +454,7 @@ fn a_sample_time_that_a_later_revolution_shares_costs_one_revolution() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn refused_point_clouds_leave_the_byte_order_as_it_was() {
     let Some(recording) = bytes(REVOLUTIONS) else {
         return;
@@ -478,6 +489,7 @@ fn swapped_in_unknown_unit(payload: &[u8]) -> Vec<u8> {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn wrong_azimuths_are_refused_once_and_right_ones_welcome_back_at_once() {
     let Some(recording) = bytes(REVOLUTIONS) else {
         return;
@@ -521,6 +533,7 @@ fn cuts(recording: &[u8], random: &mut Random, count: usize) -> Vec<usize> {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_cut_recording_has_every_entry_before_the_cut_and_one_damage() {
     let mut random = Random::new(31);
     for name in [
@@ -566,6 +579,7 @@ fn end(entry: &Entry<'_>) -> usize {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_recording_after_a_cut_one_is_found_again_and_no_byte_is_lost() {
     let Some(recording) = bytes(REVOLUTIONS) else {
         return;
@@ -603,6 +617,7 @@ fn tiled_len(items: &Items<'_>) -> usize {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_mutated_recording_is_walked_to_its_end_without_gaps() {
     let Some(golden) = golden_frames() else {
         return;
@@ -616,6 +631,7 @@ fn a_mutated_recording_is_walked_to_its_end_without_gaps() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_recording_that_follows_itself_loses_its_first_whole_revolution() {
     let Some(recording) = bytes(REVOLUTIONS) else {
         return;
@@ -634,6 +650,7 @@ fn a_recording_that_follows_itself_loses_its_first_whole_revolution() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn cut_recordings_end_to_end_do_no_harm_to_the_pipeline() {
     let Some(recording) = bytes(REVOLUTIONS) else {
         return;

@@ -303,6 +303,7 @@ fn noise_in_place_of_a_world_gives_no_speed() {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn the_roof_of_a_parked_car_is_no_pedestrian_for_long() {
     let Some(path) = common::data("vlp16-parked-car-85rev.rec") else {
         return;

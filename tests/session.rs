@@ -224,6 +224,9 @@ fn text(path: &Path) -> &str {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
+#[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
+#[cfg_attr(not(libcluon), ignore = "needs libcluon's tools: pip install pycluon")]
 fn what_libcluon_replays_is_answered_and_libcluon_decodes_the_answer() {
     let Some(recording) = common::data("vlp16-sampleShort.rec") else {
         return;
@@ -261,6 +264,8 @@ fn what_libcluon_replays_is_answered_and_libcluon_decodes_the_answer() {
 }
 
 #[test]
+#[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
+#[cfg_attr(not(libcluon), ignore = "needs libcluon's tools: pip install pycluon")]
 fn the_example_draws_the_map_from_the_session_and_refuses_a_damaged_tile() {
     if !has_libcluon("cluon-OD4toJSON") {
         return;
@@ -296,6 +301,7 @@ fn the_example_draws_the_map_from_the_session_and_refuses_a_damaged_tile() {
 }
 
 #[test]
+#[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
 fn every_hostile_datagram_is_counted_by_name_and_the_next_revolution_is_answered() {
     in_namespace(|| {
         let _daemon = Running::daemon(&[]);
@@ -391,6 +397,7 @@ fn hostile_datagrams(revolution: &[u8]) -> Vec<Vec<u8>> {
 }
 
 #[test]
+#[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
 fn either_signal_stops_the_daemon_within_200_ms() {
     in_namespace(|| {
         for signal in [Signal::SIGTERM, Signal::SIGINT] {
@@ -417,6 +424,7 @@ fn either_signal_stops_the_daemon_within_200_ms() {
 }
 
 #[test]
+#[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
 fn the_daemon_ignores_what_it_sends_and_says_how_it_is() {
     in_namespace(|| {
         let health = |expected: &str| {
@@ -448,6 +456,7 @@ fn the_daemon_ignores_what_it_sends_and_says_how_it_is() {
 }
 
 #[test]
+#[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
 fn a_recording_played_and_recorded_comes_back_byte_for_byte() {
     in_namespace(|| {
         let folder = tempfile::tempdir().unwrap();
@@ -484,6 +493,7 @@ fn a_recording_played_and_recorded_comes_back_byte_for_byte() {
 }
 
 #[test]
+#[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
 fn the_daemon_publishes_what_process_writes() {
     in_namespace(|| {
         let folder = tempfile::tempdir().unwrap();
@@ -512,6 +522,7 @@ fn the_daemon_publishes_what_process_writes() {
 }
 
 #[test]
+#[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
 fn no_revolution_is_lost_at_20_hz_beside_a_busy_process_on_one_core() {
     in_namespace(|| {
         let kreisel = env!("CARGO_BIN_EXE_kreisel");
@@ -546,6 +557,7 @@ fn no_revolution_is_lost_at_20_hz_beside_a_busy_process_on_one_core() {
 }
 
 #[test]
+#[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
 fn the_demo_shows_objects_and_ends_by_itself() {
     in_namespace(|| {
         let (code, shown, log) = Running::kreisel(&["demo", "--duration=2.5"]).output();
@@ -556,6 +568,7 @@ fn the_demo_shows_objects_and_ends_by_itself() {
 }
 
 #[test]
+#[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
 fn the_examples_print_what_a_daemon_sends() {
     in_namespace(|| {
         let demo = Running::kreisel(&["demo", "--duration=6", "--cid=112"]);

@@ -55,6 +55,7 @@ fn in_frame(object: &Object) -> [f64; 2] {
 }
 
 #[test]
+#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn nothing_moves_where_everything_is_parked() {
     let Some(path) = common::data("vlp16-parked-car-85rev.rec") else {
         return;
