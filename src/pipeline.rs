@@ -18,7 +18,7 @@ pub use crate::fault::{Counts, Fault};
 pub use crate::report::{Outcome, RevolutionReport, Step};
 
 /// Message numbers that are ours: what we send, heard back.
-const OWN_IDS: std::ops::RangeInclusive<i32> = 2020..=2039;
+pub const OWN_IDS: std::ops::RangeInclusive<i32> = 2020..=2039;
 
 /// Message numbers of poses.
 const POSE_IDS: [i32; 7] = [

@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use etherparse::{SlicedPacket, TransportSlice};
-use indicatif::ProgressBar;
 use pcap_parser::traits::PcapNGPacketBlock as _;
 use pcap_parser::{Block, Linktype, PcapBlockOwned, PcapError, create_reader};
 
+use super::Completion;
+use super::files::progress;
 use crate::time::Time;
 use crate::wire::envelope::Postmark;
 use crate::wire::point_cloud::POINT_CLOUD_ID;
@@ -55,19 +56,27 @@ pub(super) struct Capture {
     cut: u64,
     dual_returns: u64,
     /// What ended it early, if anything did.
-    pub(super) damage: Option<String>,
+    damage: Option<String>,
 }
 
 impl Capture {
-    /// Reads a capture; its envelopes bear a senderStamp.
-    pub(super) fn read(bytes: &[u8], sender_stamp: u32, bar: &ProgressBar) -> Self {
-        let mut capture = Self::default();
+    /// Reads the capture that a file holds; its envelopes bear a senderStamp.
+    ///
+    /// # Errors
+    /// When there is no data packet of a VLP-16 in it.
+    pub(super) fn read(path: &Path, bytes: &[u8], sender_stamp: u32) -> Result<Self> {
+        let (mut capture, bar) = (Self::default(), progress(bytes.len(), "bytes"));
         capture.damage = walk(bytes, |offset, captured| {
             bar.set_position(offset as u64);
             capture.take(sender_stamp, &captured);
         });
         bar.finish_and_clear();
-        capture
+        if capture.packets == 0 {
+            let nothing = || "byte 0: no VLP-16 data packets".into();
+            let problem = capture.damage.unwrap_or_else(nothing);
+            bail!("{}: {problem}", path.display());
+        }
+        Ok(capture)
     }
 
     /// Its revolutions without the first one, of which only the end was captured.
@@ -80,9 +89,13 @@ impl Capture {
         self.assembler.pending_columns()
     }
 
-    /// Whether anything in it could not be read.
-    pub(super) fn is_damaged(&self) -> bool {
-        self.damage.is_some() || self.broken + self.cut > 0
+    /// Whether all of it could be read.
+    pub(super) fn completion(&self) -> Completion {
+        if self.damage.is_some() || self.broken + self.cut > 0 {
+            Completion::Damaged
+        } else {
+            Completion::Done
+        }
     }
 
     fn take(&mut self, sender_stamp: u32, captured: &Captured<'_>) {
@@ -141,9 +154,7 @@ impl Capture {
                 tell!("kreisel: {path}: {count} {what}");
             }
         }
-        if let Some(problem) = &self.damage
-            && self.packets > 0
-        {
+        if let Some(problem) = &self.damage {
             tell!("kreisel: {path}: {problem}; the rest is skipped");
         }
     }

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use clap::Args;
 
 use super::capture::Capture;
-use super::files::{Output, progress};
+use super::files::Output;
 use super::{Completion, files};
 
 #[derive(Debug, Args)]
@@ -25,12 +25,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let bytes = files::read(&arguments.input)?;
     files::check_distinct(&arguments.input, &[Some(&arguments.output)])?;
-    let capture = Capture::read(&bytes, arguments.id, &progress(bytes.len(), "bytes"));
-    if capture.packets == 0 {
-        let nothing = || "byte 0: no VLP-16 data packets".into();
-        let problem = capture.damage.unwrap_or_else(nothing);
-        bail!("{}: {problem}", arguments.input.display());
-    }
+    let capture = Capture::read(&arguments.input, &bytes, arguments.id)?;
     let mut output = Output::create(&arguments.output)?;
     output.put(&capture.frames)?;
     output.finish()?;
@@ -41,9 +36,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
         capture.pending_columns(),
     );
     capture.warn(&arguments.input);
-    if capture.is_damaged() {
-        Ok(Completion::Damaged)
-    } else {
-        Ok(Completion::Done)
-    }
+    Ok(capture.completion())
 }

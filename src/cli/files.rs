@@ -24,18 +24,9 @@ pub(super) fn read_recording(path: &Path) -> Result<(Vec<u8>, Completion)> {
     if !capture::is_capture(&bytes) {
         return Ok((bytes, Completion::Done));
     }
-    let capture = Capture::read(&bytes, 0, &progress(bytes.len(), "bytes"));
-    if capture.packets == 0 {
-        let nothing = || "byte 0: no VLP-16 data packets".into();
-        let problem = capture.damage.unwrap_or_else(nothing);
-        bail!("{}: {problem}", path.display());
-    }
+    let capture = Capture::read(path, &bytes, 0)?;
     capture.warn(path);
-    let completion = if capture.is_damaged() {
-        Completion::Damaged
-    } else {
-        Completion::Done
-    };
+    let completion = capture.completion();
     Ok((capture.whole_revolutions(), completion))
 }
 

@@ -38,6 +38,10 @@ mod npz;
 
 mod objects;
 
+mod onlooker;
+
+mod playback;
+
 mod process;
 
 mod record;

@@ -38,7 +38,7 @@ const SEED: u64 = 1;
 
 /// Longest pause that is waited for, as in libcluon's player: what is longer is a gap in the
 /// recording or a time stamp from elsewhere.
-const LONGEST_PAUSE_S: f64 = 1.0;
+pub(super) const LONGEST_PAUSE_S: f64 = 1.0;
 
 fn speed(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {

@@ -78,12 +78,11 @@ impl<'a> Worker<'a> {
         let Ok((envelope, _)) = Envelope::from_datagram(job.datagram.bytes()) else {
             return;
         };
-        let mut view = self.view.take();
-        if let Some(view) = &mut view {
+        if let Some(view) = &mut self.view {
             view.begin();
         }
         let note = |step| {
-            if let Some(view) = &mut view {
+            if let Some(view) = &mut self.view {
                 view.note(step);
             }
         };
@@ -91,13 +90,13 @@ impl<'a> Worker<'a> {
             Ok(Outcome::Revolution(report)) => {
                 let processing_s = begin.elapsed().as_secs_f32();
                 let frames = self.pipeline.publish_objects(now(), processing_s);
-                send(&self.sender, frames, &mut self.log, &mut view);
+                send(&self.sender, frames, &mut self.log, &mut self.view);
                 self.latency.record(now() - job.arrival);
                 self.vitals.answered();
                 self.pipeline.update_map();
                 let frames = self.pipeline.publish_map(now());
-                send(&self.sender, frames, &mut self.log, &mut view);
-                if let Some(view) = &mut view {
+                send(&self.sender, frames, &mut self.log, &mut self.view);
+                if let Some(view) = &mut self.view {
                     view.note(Step::Map);
                     view.show(&self.pipeline, &report, None);
                 }
@@ -106,7 +105,6 @@ impl<'a> Worker<'a> {
             Ok(_) => {}
             Err(fault) => self.log.note(fault.name(), || fault.to_string()),
         }
-        self.view = view;
     }
 
     /// Notes what could not be answered.

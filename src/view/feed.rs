@@ -112,26 +112,24 @@ impl Feed {
 
     /// Shows the pipeline's last revolution, and what was published since the last one.
     pub fn show(&mut self, pipeline: &Pipeline, report: &RevolutionReport, player: Option<Player>) {
-        if !self.is_watched() {
-            self.frames.clear();
-            return;
-        }
         let around = Around::of(pipeline, report.ground.plane.height_m());
-        self.painter.label(&around, pipeline);
-        self.send(&around, player);
+        self.send(&around, Some(pipeline), player);
     }
 
     /// Shows a revolution of which nobody knows what its points are.
     pub fn show_points(&mut self, around: &Around<'_>) {
+        self.send(around, None, None);
+    }
+
+    fn send(&mut self, around: &Around<'_>, known: Option<&Pipeline>, player: Option<Player>) {
         if !self.is_watched() {
             self.frames.clear();
             return;
         }
-        self.painter.label_none(around.scan);
-        self.send(around, None);
-    }
-
-    fn send(&mut self, around: &Around<'_>, player: Option<Player>) {
+        match known {
+            Some(pipeline) => self.painter.label(around, pipeline),
+            None => self.painter.label_none(around.scan),
+        }
         let mut bytes = vec![];
         self.painter
             .paint(around, &self.steps_ms, player, &mut bytes);

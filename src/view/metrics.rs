@@ -27,144 +27,65 @@ pub(super) fn health(told: Option<&Told>) -> Result<(), &'static str> {
     }
 }
 
+/// Values of one name, each with its labels, of which most have none.
+struct Family {
+    name: &'static str,
+    kind: &'static str,
+    help: &'static str,
+    values: Vec<(String, f64)>,
+}
+
+fn counter(name: &'static str, count: u64, help: &'static str) -> Family {
+    // Counters stay far below what a float holds exactly.
+    let values = vec![(String::new(), count as f64)];
+    Family {
+        name,
+        kind: "counter",
+        help,
+        values,
+    }
+}
+
+fn gauge(name: &'static str, value: impl Into<f64>, help: &'static str) -> Family {
+    let values = vec![(String::new(), value.into())];
+    Family {
+        name,
+        kind: "gauge",
+        help,
+        values,
+    }
+}
+
 /// All that Status counts and measures.
 pub(super) fn text(status: &Status) -> String {
     let mut out = String::new();
-    let counters = [
-        (
-            "revolutions_received",
-            status.revolutions_received,
-            "Point clouds that came in whole",
-        ),
-        (
-            "revolutions_published",
-            status.revolutions_published,
-            "Object lists sent",
-        ),
-        (
-            "revolutions_refused",
-            status.revolutions_refused,
-            "Point clouds refused",
-        ),
-        (
-            "revolutions_queue_dropped",
-            status.revolutions_queue_dropped,
-            "Point clouds dropped because the pipeline was behind",
-        ),
-        (
-            "datagrams_received",
-            status.datagrams_received,
-            "Datagrams of the session",
-        ),
-        (
-            "datagrams_kernel_dropped",
-            status.datagrams_kernel_dropped,
-            "Datagrams that the kernel dropped for want of buffer",
-        ),
-        (
-            "datagrams_damaged",
-            status.datagrams_damaged,
-            "Datagrams that were no sound envelope",
-        ),
-        (
-            "poses_received",
-            status.poses_received,
-            "Pose messages read",
-        ),
-        (
-            "pose_jumps",
-            status.pose_jumps,
-            "Jumps of a pose source that stayed",
-        ),
-        (
-            "odometry_restarts",
-            status.odometry_restarts.into(),
-            "Times that the odometry frame began anew",
-        ),
-        (
-            "ground_held",
-            status.ground_held,
-            "Revolutions that kept the last good ground plane",
-        ),
-        (
-            "ground_fallback",
-            status.ground_fallback,
-            "Revolutions that fell back to the configured sensor height",
-        ),
-    ];
-    for (name, value, help) in counters {
-        put(
-            &mut out,
-            &format!("{name}_total"),
-            "counter",
-            help,
-            &[("", f64_of(value))],
+    for Family {
+        name,
+        kind,
+        help,
+        values,
+    } in families(status)
+    {
+        // Writing to a string never fails.
+        let _ = writeln!(
+            out,
+            "# HELP kreisel_{name} {help}.\n# TYPE kreisel_{name} {kind}"
         );
+        for (labels, value) in values {
+            let _ = writeln!(out, "kreisel_{name}{labels} {value}");
+        }
     }
-    let faults: Vec<(String, f64)> = status
-        .faults
-        .split_whitespace()
-        .filter_map(|fault| {
-            let (name, count) = fault.split_once('=')?;
-            Some((format!("{{fault=\"{name}\"}}"), count.parse().ok()?))
-        })
-        .collect();
-    put(
-        &mut out,
-        "faults_total",
-        "counter",
-        "What could not be used, by name",
-        &faults,
-    );
-    let gauges = [
-        ("uptime_seconds", status.uptime, "Since start"),
-        (
-            "healthy",
-            f64::from(u8::from(status.healthy)),
-            "Whether it receives and keeps up",
-        ),
-        (
-            "rotation_hertz",
-            status.rotation_rate.into(),
-            "Revolutions a second",
-        ),
-        (
-            "ground_height_metres",
-            status.ground_height.into(),
-            "Sensor above the ground plane",
-        ),
-        (
-            "ground_tilt_radians",
-            status.ground_tilt.into(),
-            "Ground plane against the sensor",
-        ),
-        (
-            "odometry_deviation_metres",
-            status.odometry_deviation.into(),
-            "Standard deviation of the place in its worst direction",
-        ),
-        (
-            "pose_disagreement_metres",
-            status.pose_disagreement.into(),
-            "Pose source and odometry apart",
-        ),
-        (
-            "latency_longest_seconds",
-            status.latency_max.into(),
-            "Arrival to list sent, since start",
-        ),
-    ];
-    for (name, value, help) in gauges {
-        put(&mut out, name, "gauge", help, &[("", value)]);
-    }
-    let latencies = [
-        ("{quantile=\"0.5\"}", f64::from(status.latency_median)),
-        ("{quantile=\"0.99\"}", status.latency_p99.into()),
-        ("{quantile=\"0.999\"}", status.latency_p999.into()),
-    ];
-    let help = "Arrival of a point cloud to its list sent, of the latest 6,000 to 12,000";
-    put(&mut out, "latency_seconds", "gauge", help, &latencies);
-    let labels = format!(
+    out
+}
+
+fn families(status: &Status) -> Vec<Family> {
+    let faults = status.faults.split_whitespace().filter_map(|fault| {
+        let (name, count) = fault.split_once('=')?;
+        Some((format!("{{fault=\"{name}\"}}"), count.parse().ok()?))
+    });
+    let quantile =
+        |share: f64, seconds: f32| (format!("{{quantile=\"{share}\"}}"), f64::from(seconds));
+    let found = format!(
         "{{version=\"{}\",profile=\"{}\",sensor=\"{}\",byte_order=\"{}\",odometry=\"{}\",pose_source=\"{}\"}}",
         status.version,
         status.profile,
@@ -173,30 +94,126 @@ pub(super) fn text(status: &Status) -> String {
         status.odometry,
         status.pose_source
     );
-    put(
-        &mut out,
-        "info",
-        "gauge",
-        "What runs, and what was found",
-        &[(&labels, 1.0)],
-    );
-    out
-}
-
-/// Counters stay far below what a float holds exactly.
-fn f64_of(count: u64) -> f64 {
-    count as f64
-}
-
-fn put(out: &mut String, name: &str, kind: &str, help: &str, values: &[(impl AsRef<str>, f64)]) {
-    // Writing to a string never fails.
-    let _ = writeln!(
-        out,
-        "# HELP kreisel_{name} {help}.\n# TYPE kreisel_{name} {kind}"
-    );
-    for (labels, value) in values {
-        let _ = writeln!(out, "kreisel_{name}{} {value}", labels.as_ref());
-    }
+    vec![
+        counter(
+            "revolutions_received_total",
+            status.revolutions_received,
+            "Point clouds that came in whole",
+        ),
+        counter(
+            "revolutions_published_total",
+            status.revolutions_published,
+            "Object lists sent",
+        ),
+        counter(
+            "revolutions_refused_total",
+            status.revolutions_refused,
+            "Point clouds refused",
+        ),
+        counter(
+            "revolutions_queue_dropped_total",
+            status.revolutions_queue_dropped,
+            "Point clouds dropped because the pipeline was behind",
+        ),
+        counter(
+            "datagrams_received_total",
+            status.datagrams_received,
+            "Datagrams of the session",
+        ),
+        counter(
+            "datagrams_kernel_dropped_total",
+            status.datagrams_kernel_dropped,
+            "Datagrams that the kernel dropped for want of buffer",
+        ),
+        counter(
+            "datagrams_damaged_total",
+            status.datagrams_damaged,
+            "Datagrams that were no sound envelope",
+        ),
+        counter(
+            "poses_received_total",
+            status.poses_received,
+            "Pose messages read",
+        ),
+        counter(
+            "pose_jumps_total",
+            status.pose_jumps,
+            "Jumps of a pose source that stayed",
+        ),
+        counter(
+            "odometry_restarts_total",
+            status.odometry_restarts.into(),
+            "Times that the odometry frame began anew",
+        ),
+        counter(
+            "ground_held_total",
+            status.ground_held,
+            "Revolutions that kept the last good ground plane",
+        ),
+        counter(
+            "ground_fallback_total",
+            status.ground_fallback,
+            "Revolutions that fell back to the configured sensor height",
+        ),
+        Family {
+            name: "faults_total",
+            kind: "counter",
+            help: "What could not be used, by name",
+            values: faults.collect(),
+        },
+        gauge("uptime_seconds", status.uptime, "Since start"),
+        gauge(
+            "healthy",
+            u8::from(status.healthy),
+            "Whether it receives and keeps up",
+        ),
+        gauge(
+            "rotation_hertz",
+            status.rotation_rate,
+            "Revolutions a second",
+        ),
+        gauge(
+            "ground_height_metres",
+            status.ground_height,
+            "Sensor above the ground plane",
+        ),
+        gauge(
+            "ground_tilt_radians",
+            status.ground_tilt,
+            "Ground plane against the sensor",
+        ),
+        gauge(
+            "odometry_deviation_metres",
+            status.odometry_deviation,
+            "Standard deviation of the place in its worst direction",
+        ),
+        gauge(
+            "pose_disagreement_metres",
+            status.pose_disagreement,
+            "Pose source and odometry apart",
+        ),
+        gauge(
+            "latency_longest_seconds",
+            status.latency_max,
+            "Arrival to list sent, since start",
+        ),
+        Family {
+            name: "latency_seconds",
+            kind: "gauge",
+            help: "Arrival of a point cloud to its list sent, of the latest 6,000 to 12,000",
+            values: vec![
+                quantile(0.5, status.latency_median),
+                quantile(0.99, status.latency_p99),
+                quantile(0.999, status.latency_p999),
+            ],
+        },
+        Family {
+            name: "info",
+            kind: "gauge",
+            help: "What runs, and what was found",
+            values: vec![(found, 1.0)],
+        },
+    ]
 }
 
 #[cfg(test)]

@@ -247,7 +247,7 @@ async fn pictures(
         .max_message_size(LONGEST_CONTROL)
         .max_frame_size(LONGEST_CONTROL);
     upgrade.on_upgrade(move |socket| async move {
-        watch(socket, served.shown.subscribe(), served.controls).await;
+        send_pictures(socket, served.shown.subscribe(), served.controls).await;
         drop(place);
     })
 }
@@ -275,7 +275,7 @@ fn is_own_page(headers: &HeaderMap, is_local: bool) -> bool {
 }
 
 /// Sends pictures to a viewer, always the newest, and takes what it asks for, until it is gone.
-async fn watch(
+async fn send_pictures(
     mut socket: WebSocket,
     mut shown: watch::Receiver<Shown>,
     controls: mpsc::Sender<Control>,
