@@ -7,6 +7,8 @@ use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use kreisel::wire::envelope::Postmark;
+use kreisel::wire::grid_tile::GridTile;
 use kreisel::wire::object_list::ObjectList;
 use kreisel::wire::status::Status;
 use kreisel::wire::{Message as _, Recording};
@@ -69,11 +71,14 @@ impl Served {
     }
 
     fn get(&self, path: &str) -> String {
+        self.get_from(path, &self.address)
+    }
+
+    fn get_from(&self, path: &str, host: &str) -> String {
         let mut stream = self.connect();
-        let address = &self.address;
         write!(
             stream,
-            "GET {path} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n"
+            "GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n"
         )
         .unwrap();
         let mut answer = String::new();
@@ -112,6 +117,7 @@ struct Picture {
     points: usize,
     lists: Vec<ObjectList>,
     statuses: Vec<Status>,
+    tiles: usize,
     length: usize,
 }
 
@@ -124,12 +130,13 @@ fn next(socket: &mut WebSocket<TcpStream>) -> Picture {
         let json = length(0);
         let points = length(4 + json);
         let frames = &bytes[8 + json + 7 * points..];
-        let (mut lists, mut statuses) = (vec![], vec![]);
+        let (mut lists, mut statuses, mut tiles) = (vec![], vec![], 0);
         for entry in Recording::new(frames) {
             let envelope = entry.unwrap().envelope;
             match envelope.data_type {
                 ObjectList::ID => lists.push(ObjectList::decode(envelope.payload, 0).unwrap()),
                 Status::ID => statuses.push(Status::decode(envelope.payload, 0).unwrap()),
+                GridTile::ID => tiles += 1,
                 _ => {}
             }
         }
@@ -138,6 +145,7 @@ fn next(socket: &mut WebSocket<TcpStream>) -> Picture {
             points,
             lists,
             statuses,
+            tiles,
             length: bytes.len(),
         };
     }
@@ -206,6 +214,10 @@ fn a_page_from_elsewhere_sees_nothing() {
         panic!("it was let in");
     };
     assert_eq!(answer.status(), StatusCode::FORBIDDEN);
+    for path in ["/", "/metrics", "/health"] {
+        let answer = demo.get_from(path, "elsewhere.example:8111");
+        assert!(answer.starts_with("HTTP/1.1 403"), "{path}: {answer}");
+    }
 }
 
 #[test]
@@ -253,15 +265,38 @@ fn more_viewers_than_there_is_room_for_are_turned_away() {
     assert!(next(&mut demo.watch()).points > 2000);
 }
 
+/// A recording of a simulated roundabout in which a second sensor speaks between the first one's revolutions, and
+/// which a pose ends.
+fn recording(folder: &std::path::Path) -> String {
+    let path = folder.join("drive.rec");
+    let mut simulate = Command::new(env!("CARGO_BIN_EXE_kreisel"));
+    simulate
+        .args(["simulate", "roundabout", "--duration=6", "--output"])
+        .arg(&path);
+    assert!(simulate.status().unwrap().success());
+    let bytes = std::fs::read(&path).unwrap();
+    let mut both = vec![];
+    for entry in Recording::new(&bytes).flatten() {
+        both.extend_from_slice(entry.frame);
+        let (time, payload) = (entry.envelope.time(), entry.envelope.payload);
+        let postmark = Postmark {
+            sent: time,
+            sampled: time,
+            sender_stamp: 9,
+        };
+        postmark.put_payload(&mut both, entry.envelope.data_type, |out| {
+            out.extend_from_slice(payload)
+        });
+    }
+    std::fs::write(&path, both).unwrap();
+    path.to_str().unwrap().into()
+}
+
 #[test]
 fn a_recording_is_played_paused_stepped_and_sought() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("drive.rec");
-    let path = path.to_str().unwrap();
-    let mut simulate = Command::new(env!("CARGO_BIN_EXE_kreisel"));
-    let simulate = simulate.args(["simulate", "roundabout", "--duration=6", "--output", path]);
-    assert!(simulate.status().unwrap().success());
-    let view = Served::start(&["view", path, "--address=127.0.0.1:0"]);
+    let path = recording(folder.path());
+    let view = Served::start(&["view", &path, "--address=127.0.0.1:0"]);
     let mut viewer = view.watch();
     let player = |picture: &Picture, name: &str| picture.heading["player"][name].clone();
     let at_s = |picture: &Picture| player(picture, "at_s").as_f64().unwrap();
@@ -269,11 +304,14 @@ fn a_recording_is_played_paused_stepped_and_sought() {
     let begin = next(&mut viewer);
     assert!(at_s(&begin) < 1.0, "{}", begin.heading);
     assert!((5.5..6.1).contains(&player(&begin, "duration_s").as_f64().unwrap()));
-    let mut until = |control: &str, wanted: &dyn Fn(&Picture) -> bool| {
-        viewer.send(Message::text(control)).unwrap();
+    let mut until = |controls: &str, wanted: &dyn Fn(&Picture) -> bool| {
+        for control in controls.split(' ') {
+            viewer.send(Message::text(control)).unwrap();
+        }
         let mut pictures = (0..100).map(|_| next(&mut viewer));
-        pictures.find(|picture| wanted(picture)).expect(control)
+        pictures.find(|picture| wanted(picture)).expect(controls)
     };
+    until(r#"{"seek":1.0}"#, &|picture| at_s(picture) > 0.95);
     let paused = until(r#"{"play":false}"#, &|picture| {
         player(picture, "is_playing") == false
     });
@@ -289,13 +327,49 @@ fn a_recording_is_played_paused_stepped_and_sought() {
         "{}",
         back.heading
     );
-    assert_eq!(player(&back, "run"), 1);
+    // A second step before the first one is done is another step.
+    let twice = until(r#"{"step":-1} {"step":-1}"#, &|picture| {
+        at_s(picture) < at_s(&back) - 0.15
+    });
+    assert!(
+        (at_s(&back) - at_s(&twice) - 0.2).abs() < 0.01,
+        "{}",
+        twice.heading
+    );
     let late = until(r#"{"seek":5.0}"#, &|picture| at_s(picture) > 4.5);
     assert!((at_s(&late) - 5.0).abs() < 0.11);
     let early = until(r#"{"seek":0.5}"#, &|picture| at_s(picture) < 4.0);
     assert!((at_s(&early) - 0.5).abs() < 0.11);
-    let end = until(r#"{"play":true}"#, &|picture| at_s(picture) > 1.0);
-    assert_eq!(player(&end, "is_playing"), true);
+    let on = until(r#"{"play":true}"#, &|picture| at_s(picture) > 1.0);
+    assert_eq!(player(&on, "is_playing"), true);
+    until(r#"{"seek":5.8}"#, &|picture| {
+        player(picture, "is_playing") == false
+    });
+    // At its end it begins anew, whatever comes after the last revolution.
+    let again = until(r#"{"play":true}"#, &|picture| at_s(picture) < 2.0);
+    assert_eq!(player(&again, "is_playing"), true);
+}
+
+#[test]
+fn who_comes_while_it_is_paused_sees_objects_and_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let view = Served::start(&["view", &recording(folder.path()), "--address=127.0.0.1:0"]);
+    let mut viewer = view.watch();
+    viewer.send(Message::text(r#"{"seek":3.0}"#)).unwrap();
+    viewer.send(Message::text(r#"{"play":false}"#)).unwrap();
+    let mut pictures = (0..50).map(|_| next(&mut viewer));
+    let is_there = |picture: &Picture| {
+        let player = &picture.heading["player"];
+        player["is_playing"] == false && player["at_s"].as_f64().unwrap() > 2.9
+    };
+    pictures.find(is_there).expect("paused at 3 s");
+    let late = next(&mut view.watch());
+    assert_eq!(late.lists.len(), 1);
+    assert!(
+        late.lists[0].count > 3 && late.tiles > 20,
+        "{} tiles",
+        late.tiles
+    );
 }
 
 #[test]

@@ -1,12 +1,15 @@
 //! Where pictures are made, if somebody looks.
 
 use std::net::SocketAddr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use axum::body::Bytes;
 use tokio::sync::watch;
 
 use super::metrics::Told;
+use super::newest::Newest;
 use super::picture::{Around, Painter, Player};
 use crate::pipeline::{Pipeline, RevolutionReport, Step};
 use crate::time::Time;
@@ -33,16 +36,23 @@ pub struct Feed {
     steps_ms: Vec<(&'static str, f32)>,
     /// What was published since the last picture.
     frames: Vec<u8>,
+    newest: Newest,
+    /// Whether the next picture must hold the newest of everything instead.
+    needs_all: bool,
+    /// Viewers that came so far, and those of them for whom there was a picture.
+    came: Arc<AtomicU64>,
+    welcomed: u64,
 }
 
-/// Of more frames than this since the last picture the oldest are left out: map tiles come again.
-const MOST_FRAME_BYTES: usize = 1 << 20;
+/// Instead of more frames than this since the last picture the newest of everything is sent.
+const MOST_FRAME_BYTES: usize = 1 << 18;
 
 impl Feed {
     pub(super) fn new(
         address: SocketAddr,
         shown: watch::Sender<Shown>,
         told: watch::Sender<Option<Told>>,
+        came: Arc<AtomicU64>,
     ) -> Self {
         Self {
             address,
@@ -52,6 +62,10 @@ impl Feed {
             begun: None,
             steps_ms: vec![],
             frames: vec![],
+            newest: Newest::default(),
+            needs_all: false,
+            came,
+            welcomed: 0,
         }
     }
 
@@ -88,14 +102,24 @@ impl Feed {
         *begun = now;
     }
 
-    /// A frame was published.
+    /// A frame was published, or came from a session; what is damaged or no list, Status or tile is left out.
     pub fn put(&mut self, frame: &[u8]) {
-        if self.is_watched() {
+        if !self.is_watched() {
+            // It goes on without being kept: what is known gets old.
+            self.forget();
+        } else if let Some(frame) = self.newest.take(frame) {
+            self.frames.extend_from_slice(frame);
             if self.frames.len() > MOST_FRAME_BYTES {
                 self.frames.clear();
+                self.needs_all = true;
             }
-            self.frames.extend_from_slice(frame);
         }
+    }
+
+    /// What was published means nothing any more.
+    pub fn forget(&mut self) {
+        self.frames.clear();
+        self.newest.clear();
     }
 
     /// Adds a message that is not published otherwise.
@@ -106,7 +130,9 @@ impl Feed {
                 sampled: time,
                 sender_stamp: 0,
             };
-            postmark.put(&mut self.frames, message);
+            let mut frame = vec![];
+            postmark.put(&mut frame, message);
+            self.put(&frame);
         }
     }
 
@@ -123,9 +149,10 @@ impl Feed {
 
     fn send(&mut self, around: &Around<'_>, known: Option<&Pipeline>, player: Option<Player>) {
         if !self.is_watched() {
-            self.frames.clear();
             return;
         }
+        let came = self.came.load(Ordering::Acquire);
+        self.needs_all |= std::mem::replace(&mut self.welcomed, came) != came;
         match known {
             Some(pipeline) => self.painter.label(around, pipeline),
             None => self.painter.label_none(around.scan),
@@ -133,7 +160,12 @@ impl Feed {
         let mut bytes = vec![];
         self.painter
             .paint(around, &self.steps_ms, player, &mut bytes);
-        bytes.append(&mut self.frames);
+        if std::mem::take(&mut self.needs_all) {
+            self.frames.clear();
+            self.newest.put(&mut bytes);
+        } else {
+            bytes.append(&mut self.frames);
+        }
         self.shown.send_modify(|shown| {
             shown.number += 1;
             shown.bytes = bytes.into();

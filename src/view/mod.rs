@@ -1,6 +1,7 @@
 //! The picture in a browser: points, objects and map of the last revolution, for anybody who looks.
 //!
-//! `picture` has the bytes of a revolution for the page, `feed` makes them where somebody looks,
+//! `picture` has the bytes of a revolution for the page, `feed` makes them where somebody looks, with the `newest` of
+//! what was published for those who have just come,
 //! `server` serves the page and sends them, `page/` is the page, and `metrics` is for those who watch a daemon by
 //! machine. The server has a thread of its
 //! own, and between it and the pipeline stands one picture, the newest: a viewer that stalls
@@ -9,6 +10,8 @@
 mod feed;
 
 mod metrics;
+
+mod newest;
 
 mod picture;
 

@@ -18,14 +18,13 @@ const GROUND: u8 = 0;
 const LOOSE: u8 = 1;
 /// Of a cluster that is no object: this and the numbers up to [`FIRST_OBJECT`], in turn.
 const FIRST_CLUSTER: u8 = 2;
-/// Of an object of the list: this and what follows, in turn.
+/// Of an object: this and the number of its class.
 const FIRST_OBJECT: u8 = 128;
+/// Farther from the sensor along an axis than 16 bits of centimetres reach, metres.
+const FARTHEST_M: f64 = 327.0;
 
 /// Points in a picture. With this many a picture, its map tiles among it, stays below 200 kB.
 const MOST_POINTS: usize = 22_000;
-
-/// Bytes of a point.
-const POINT_LEN: usize = 7;
 
 /// Returns so far outside of an object's box are taken for its own, metres: boxes are tight.
 const MARGIN_M: f64 = 0.3;
@@ -75,7 +74,8 @@ pub(super) struct Painter {
     kinds: Vec<u8>,
     /// By how much the points of an object went on until the end of the sweep.
     shifts_m: Vec<[f32; 2]>,
-    kept: Vec<u32>,
+    /// Places from the origin in centimetres, and what is there.
+    points: Vec<([i16; 3], u8)>,
 }
 
 impl Painter {
@@ -88,8 +88,8 @@ impl Painter {
                 self.kinds[*point as usize] = kind;
             }
         }
-        for (number, object) in pipeline.objects().iter().enumerate() {
-            let kind = FIRST_OBJECT + (number % usize::from(u8::MAX - FIRST_OBJECT + 1)) as u8;
+        for object in pipeline.objects() {
+            let kind = FIRST_OBJECT + object.class.number() as u8;
             self.label_object(around, object, kind);
         }
         let ground = pipeline.ground_mask();
@@ -163,37 +163,24 @@ impl Painter {
         put_length(out, json.len());
         out.extend_from_slice(&json);
 
-        let scan = around.scan;
-        self.kept.clear();
-        let returns = (0..scan.len()).filter(|point| scan.has_return(*point));
-        self.kept.extend(returns.map(|point| point as u32));
-        let step = self.kept.len().div_ceil(MOST_POINTS).max(1);
-        let kept: Vec<usize> = self
-            .kept
-            .iter()
-            .step_by(step)
-            .map(|point| *point as usize)
-            .collect();
-        put_length(out, kept.len());
-        let begin = out.len();
-        out.resize(begin + POINT_LEN * kept.len(), 0);
-        let (places, kinds) = out[begin..].split_at_mut((POINT_LEN - 1) * kept.len());
-        for (number, point) in kept.iter().enumerate() {
-            let place_m = around.place_m(*point);
-            for (axis, shift) in self.shifts_m[*point]
-                .iter()
-                .copied()
-                .chain([0.0])
-                .enumerate()
-            {
-                let from_origin_m =
-                    place_m[axis] + f64::from(shift) - around.sensor.position_m[axis];
-                let at = 2 * (axis * kept.len() + number);
-                let centimetres = (100.0 * from_origin_m) as i16;
-                places[at..at + 2].copy_from_slice(&centimetres.to_le_bytes());
+        self.points.clear();
+        for point in (0..around.scan.len()).filter(|point| around.scan.has_return(*point)) {
+            let (place_m, [dx, dy]) = (around.place_m(point), self.shifts_m[point].map(f64::from));
+            let [x, y, z] = [0, 1, 2].map(|axis| place_m[axis] - around.sensor.position_m[axis]);
+            let from_origin_m = [x + dx, y + dy, z];
+            if from_origin_m.iter().all(|metres| metres.abs() < FARTHEST_M) {
+                let centimetres = from_origin_m.map(|metres| (100.0 * metres) as i16);
+                self.points.push((centimetres, self.kinds[point]));
             }
-            kinds[number] = self.kinds[*point];
         }
+        let step = self.points.len().div_ceil(MOST_POINTS).max(1);
+        let points = self.points.iter().step_by(step);
+        put_length(out, points.len());
+        for axis in 0..3 {
+            let along = points.clone().map(|(centimetres, _)| centimetres[axis]);
+            out.extend(along.flat_map(i16::to_le_bytes));
+        }
+        out.extend(points.map(|(_, kind)| kind));
     }
 }
 
@@ -313,41 +300,39 @@ mod tests {
         assert_eq!(picture.kinds.len(), pipeline.scan().returns());
         assert_eq!(picture.heading["steps_ms"][0][0], "cloud");
         let [east, north, _] = around.sensor.position_m;
-        let moving = pipeline
-            .objects()
-            .iter()
-            .filter(|object| object.measured && object.speed_mps > 3.0);
-        let mut tried = 0;
-        for object in moving {
-            let number = pipeline
-                .objects()
-                .iter()
-                .position(|other| other.id == object.id)
-                .unwrap();
-            let own = picture.places_m.iter().zip(&picture.kinds);
-            let own: Vec<_> = own
-                .filter(|(_, kind)| usize::from(**kind) == 128 + number)
-                .collect();
+        let is_within = |object: &Object, [x, y, _]: &[f64; 3]| {
+            let (sine, cosine) = libm::sincos(object.yaw_rad);
+            let (x, y) = (
+                x + east - object.centre_m[0],
+                y + north - object.centre_m[1],
+            );
+            let half_m = |side_m: f64| 0.5 * side_m + MARGIN_M + 0.02;
+            libm::fabs(x * cosine + y * sine) < half_m(object.length_m)
+                && libm::fabs(y * cosine - x * sine) < half_m(object.width_m)
+        };
+        let mut returns = vec![0; pipeline.objects().len()];
+        for (place_m, kind) in picture.places_m.iter().zip(&picture.kinds) {
+            if *kind >= FIRST_OBJECT {
+                let objects = pipeline.objects();
+                let owner = objects.iter().position(|object| is_within(object, place_m));
+                let owner = owner.expect("an object where its return lies");
+                assert_eq!(
+                    objects[owner].class.number(),
+                    u32::from(kind - FIRST_OBJECT)
+                );
+                returns[owner] += 1;
+            }
+        }
+        let moving = pipeline.objects().iter().zip(&returns);
+        let moving = moving.filter(|(object, _)| object.measured && object.speed_mps > 3.0);
+        assert!(moving.clone().count() > 1);
+        for (object, returns) in moving {
             assert!(
-                2 * own.len() > object.points,
-                "{} of {}",
-                own.len(),
+                2 * returns > object.points,
+                "{returns} of {}",
                 object.points
             );
-            for ([x, y, _], _) in own {
-                let (x, y) = (
-                    x + east - object.centre_m[0],
-                    y + north - object.centre_m[1],
-                );
-                let (sine, cosine) = libm::sincos(object.yaw_rad);
-                assert!(
-                    libm::fabs(x * cosine + y * sine) < 0.5 * object.length_m + MARGIN_M + 0.02
-                );
-                assert!(libm::fabs(y * cosine - x * sine) < 0.5 * object.width_m + MARGIN_M + 0.02);
-            }
-            tried += 1;
         }
-        assert!(tried > 1, "{tried}");
     }
 
     #[test]

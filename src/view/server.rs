@@ -4,21 +4,24 @@ use std::io;
 use std::net::{IpAddr, SocketAddr};
 use std::pin::Pin;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::task::{Context, Poll};
 use std::time::Duration;
 
 use axum::Router;
 use axum::body::Bytes;
-use axum::extract::State;
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::extract::{Request, State};
+use axum::http::uri::Authority;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use serde::Deserialize;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, watch};
-use tokio::time::timeout;
+use tokio::time::{Instant, Sleep, sleep};
 
 use super::feed::{Feed, Shown};
 use super::metrics::{self, Told};
@@ -32,9 +35,6 @@ const MOST_VIEWERS: usize = 64;
 
 /// Connections at a time; more wait.
 const MOST_CONNECTIONS: usize = 256;
-
-/// A viewer that takes no picture for so long is gone.
-const PATIENCE: Duration = Duration::from_secs(90);
 
 /// Longest message of a viewer, bytes.
 const LONGEST_CONTROL: usize = 1024;
@@ -52,7 +52,7 @@ pub enum Control {
     Speed(f64),
     /// To a time, seconds since the begin.
     Seek(f64),
-    /// So many revolutions on, or back.
+    /// So many revolutions on; back, if negative.
     Step(i32),
 }
 
@@ -62,7 +62,8 @@ struct Served {
     told: watch::Sender<Option<Told>>,
     controls: mpsc::Sender<Control>,
     viewers: Arc<Semaphore>,
-    is_local: bool,
+    /// Viewers that came so far.
+    came: Arc<AtomicU64>,
 }
 
 /// Serves the view at an address from a thread of its own for as long as the process lives.
@@ -86,8 +87,9 @@ pub fn serve(address: SocketAddr) -> io::Result<(Feed, mpsc::Receiver<Control>)>
         told: told.clone(),
         controls,
         viewers: Arc::new(Semaphore::new(MOST_VIEWERS)),
-        is_local: address.ip().is_loopback(),
+        came: Arc::default(),
     };
+    let feed = Feed::new(address, shown, told, served.came.clone());
     let serve = move || {
         runtime.block_on(async {
             let listener = Limited {
@@ -100,7 +102,7 @@ pub fn serve(address: SocketAddr) -> io::Result<(Feed, mpsc::Receiver<Control>)>
     std::thread::Builder::new()
         .name("view".into())
         .spawn(serve)?;
-    Ok((Feed::new(address, shown, told), asked))
+    Ok((feed, asked))
 }
 
 /// A listener that takes so many connections at a time.
@@ -121,13 +123,7 @@ impl axum::serve::Listener for Limited {
             };
             let (stream, address) = axum::serve::Listener::accept(&mut self.listener).await;
             if stream.set_nodelay(true).is_ok() {
-                return (
-                    Connection {
-                        stream,
-                        _permit: permit,
-                    },
-                    address,
-                );
+                return (Connection::new(stream, LONGEST_SILENCE, permit), address);
             }
         }
     }
@@ -137,10 +133,43 @@ impl axum::serve::Listener for Limited {
     }
 }
 
+/// A connection over which nothing goes for so long is given up; pictures go ten times a second.
+const LONGEST_SILENCE: Duration = Duration::from_secs(30);
+
 /// A connection, counted for as long as it lives.
 struct Connection {
     stream: TcpStream,
+    /// How long nothing may go over it.
+    patience: Duration,
+    /// When it is given up.
+    end: Pin<Box<Sleep>>,
     _permit: OwnedSemaphorePermit,
+}
+
+impl Connection {
+    fn new(stream: TcpStream, patience: Duration, permit: OwnedSemaphorePermit) -> Self {
+        Self {
+            stream,
+            patience,
+            end: Box::pin(sleep(patience)),
+            _permit: permit,
+        }
+    }
+
+    /// What came of reading or writing, unless nothing has come of it for too long.
+    fn or_end<T>(
+        &mut self,
+        context: &mut Context<'_>,
+        result: Poll<io::Result<T>>,
+    ) -> Poll<io::Result<T>> {
+        if result.is_ready() {
+            self.end.as_mut().reset(Instant::now() + self.patience);
+            result
+        } else {
+            let ended = self.end.as_mut().poll(context);
+            ended.map(|()| Err(io::ErrorKind::TimedOut.into()))
+        }
+    }
 }
 
 impl AsyncRead for Connection {
@@ -149,7 +178,8 @@ impl AsyncRead for Connection {
         context: &mut Context<'_>,
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_read(context, buffer)
+        let read = Pin::new(&mut self.stream).poll_read(context, buffer);
+        self.or_end(context, read)
     }
 }
 
@@ -159,7 +189,8 @@ impl AsyncWrite for Connection {
         context: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
-        Pin::new(&mut self.stream).poll_write(context, bytes)
+        let written = Pin::new(&mut self.stream).poll_write(context, bytes);
+        self.or_end(context, written)
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
@@ -209,6 +240,7 @@ fn router(served: Served) -> Router {
         .route("/pictures", get(pictures))
         .route("/metrics", get(metrics))
         .route("/health", get(health))
+        .layer(middleware::from_fn(refuse_strangers))
         .with_state(served)
 }
 
@@ -231,15 +263,7 @@ async fn health(State(served): State<Served>) -> Response {
 }
 
 /// Opens the stream of pictures.
-async fn pictures(
-    State(served): State<Served>,
-    headers: HeaderMap,
-    upgrade: WebSocketUpgrade,
-) -> Response {
-    if !is_own_page(&headers, served.is_local) {
-        let why = "only the page that is served here may look";
-        return (StatusCode::FORBIDDEN, why).into_response();
-    }
+async fn pictures(State(served): State<Served>, upgrade: WebSocketUpgrade) -> Response {
     let Ok(place) = served.viewers.clone().try_acquire_owned() else {
         return (StatusCode::SERVICE_UNAVAILABLE, "too many viewers").into_response();
     };
@@ -247,31 +271,41 @@ async fn pictures(
         .max_message_size(LONGEST_CONTROL)
         .max_frame_size(LONGEST_CONTROL);
     upgrade.on_upgrade(move |socket| async move {
-        send_pictures(socket, served.shown.subscribe(), served.controls).await;
+        let shown = served.shown.subscribe();
+        served.came.fetch_add(1, Ordering::Release);
+        send_pictures(socket, shown, served.controls).await;
         drop(place);
     })
 }
 
-/// Whether a browser asks for our own page, not for another one that points at this host: a
-/// WebSocket is not held back by the same-origin policy. What is no browser names no origin.
-fn is_own_page(headers: &HeaderMap, is_local: bool) -> bool {
+/// Refuses what a page from elsewhere asks for.
+async fn refuse_strangers(request: Request, next: Next) -> Response {
+    if is_own_page(request.headers()) {
+        next.run(request).await
+    } else {
+        let why = "open this page by its address; only the page that is served here may look";
+        (StatusCode::FORBIDDEN, why).into_response()
+    }
+}
+
+/// Whether what asks is our own page, or no browser: a WebSocket is not held back by the same-origin policy, and a
+/// page whose name server leads here passes for our own. What is no browser names no origin; names that anybody
+/// can register have a dot.
+fn is_own_page(headers: &HeaderMap) -> bool {
     let text = |name| {
         headers
             .get(name)
             .and_then(|value: &HeaderValue| value.to_str().ok())
     };
-    let Some(host) = text(header::HOST) else {
+    let Some(host) = text(header::HOST).and_then(|host| host.parse::<Authority>().ok()) else {
         return false;
     };
     let is_same = text(header::ORIGIN).is_none_or(|origin| {
-        origin
-            .split_once("://")
-            .is_some_and(|(_, authority)| authority == host)
+        let authority = origin.split_once("://").map(|(_, authority)| authority);
+        authority == Some(host.as_str())
     });
-    // A name that somebody else's name server leads here must not do.
-    let name = host.rsplit_once(':').map_or(host, |(name, _)| name);
-    let is_address = name.trim_matches(['[', ']']).parse::<IpAddr>().is_ok();
-    is_same && (!is_local || is_address || name == "localhost")
+    let name = host.host().trim_matches(['[', ']']);
+    is_same && (name.parse::<IpAddr>().is_ok() || !name.contains('.'))
 }
 
 /// Sends pictures to a viewer, always the newest, and takes what it asks for, until it is gone.
@@ -295,8 +329,7 @@ async fn send_pictures(
                 } else {
                     newest.bytes
                 };
-                let sent = timeout(PATIENCE, socket.send(Message::Binary(bytes))).await;
-                if !matches!(sent, Ok(Ok(()))) {
+                if socket.send(Message::Binary(bytes)).await.is_err() {
                     return;
                 }
             }
@@ -320,32 +353,49 @@ mod tests {
 
     #[test]
     fn only_the_page_itself_may_look() {
-        let headers = |host: &'static str, origin: Option<&'static str>| {
+        let may_look = |host: &'static str, origin: Option<&'static str>| {
             let mut headers = HeaderMap::new();
             headers.insert(header::HOST, HeaderValue::from_static(host));
             if let Some(origin) = origin {
                 headers.insert(header::ORIGIN, HeaderValue::from_static(origin));
             }
-            headers
+            is_own_page(&headers)
         };
         let here = "127.0.0.1:8111";
-        assert!(is_own_page(
-            &headers(here, Some("http://127.0.0.1:8111")),
-            true
-        ));
-        assert!(is_own_page(&headers("[::1]:8111", None), true));
-        assert!(is_own_page(&headers("localhost:8111", None), true));
-        assert!(!is_own_page(
-            &headers(here, Some("http://elsewhere.example")),
-            true
-        ));
-        let misled = headers(
-            "elsewhere.example:8111",
-            Some("http://elsewhere.example:8111"),
+        assert!(may_look(here, Some("http://127.0.0.1:8111")));
+        assert!(may_look("[::1]:8111", None) && may_look("[::1]", None));
+        assert!(may_look("localhost:8111", None) && may_look("perception:8111", None));
+        assert!(!may_look(here, Some("http://elsewhere.example")));
+        assert!(!may_look(here, Some("null")));
+        let misled = "elsewhere.example:8111";
+        assert!(
+            !may_look(misled, Some("http://elsewhere.example:8111")) && !may_look(misled, None)
         );
-        assert!(!is_own_page(&misled, true));
-        assert!(is_own_page(&misled, false));
-        assert!(!is_own_page(&HeaderMap::new(), false));
+        assert!(!is_own_page(&HeaderMap::new()));
+    }
+
+    #[tokio::test]
+    async fn a_connection_over_which_nothing_goes_is_given_up() {
+        use tokio::io::AsyncReadExt as _;
+        use tokio::io::AsyncWriteExt as _;
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let mut client = TcpStream::connect(listener.local_addr().unwrap())
+            .await
+            .unwrap();
+        let (stream, _) = listener.accept().await.unwrap();
+        let connections = Arc::new(Semaphore::new(1));
+        let permit = connections.clone().acquire_owned().await.unwrap();
+        let mut connection = Connection::new(stream, Duration::from_millis(300), permit);
+        // What says something in time is kept.
+        for _ in 0..4 {
+            tokio::time::sleep(Duration::from_millis(100)).await;
+            client.write_all(b"x").await.unwrap();
+            assert_eq!(connection.read_u8().await.unwrap(), b'x');
+        }
+        let error = connection.read_u8().await.unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::TimedOut);
+        drop(connection);
+        assert_eq!(connections.available_permits(), 1);
     }
 
     #[test]

@@ -6,7 +6,10 @@ import { Camera, className, draw } from "./scene.js";
 import { LatencyLine, showObject, showStatus, showSteps } from "./panel.js";
 
 const TRAIL_S = 5;
+const MOST_PLACES = 100;
 const HISTORY = 600;
+const MOST_HISTORIES = 1000;
+const SILENCE_MS = 1500;
 const RECONNECT_MS = 1000;
 
 const byId = (id) => document.getElementById(id);
@@ -17,17 +20,18 @@ const camera = new Camera();
 // All that is known; the tests of the page read it, too.
 const world = {
   map: new GridMap(), layers: { map: true, points: true, trails: true, labels: true },
-  objects: [], labels: [], ratio: 1, pictures: 0, connected: false, selected: null,
+  objects: [], labels: [], ratio: 1, pictures: 0, connected: false, selected: null, heard: 0,
 };
 window.kreisel = world;
 
 let latency, colours, socket, arrivals;
+let isSeeking = false;
 
 function forget() {
   world.map.clear();
   Object.assign(world, {
     objects: [], trails: new Map(), histories: new Map(), path: [], points: null, heading: null, vehicle: null,
-    groundZ: 0, status: null, run: 0,
+    groundZ: 0, status: null, run: 0, time: null,
   });
   latency = new LatencyLine();
   arrivals = [];
@@ -79,18 +83,17 @@ function take({ heading, points, messages }) {
   for (const { kind, message, time } of messages) {
     if (kind === "tile") world.map.take(message, colours);
     else if (kind === "status") world.status = message;
-    else if (kind === "list") {
+    else if (kind === "list" && time !== world.time) {
       isNew = true;
       takeList(message, time, now);
     }
   }
-  Object.assign(world, { heading, points });
+  Object.assign(world, { heading, points, heard: now });
   const [, , up] = heading.origin_m;
   world.groundZ = up - heading.ground_below_m;
   camera.centre = { x: heading.origin_m[0], y: heading.origin_m[1], z: world.groundZ };
   if (isNew) {
     world.pictures++;
-    arrivals = arrivals.filter((arrival) => now - arrival < 3000);
     arrivals.push(now);
     const { path } = world, [x, y] = heading.origin_m, last = path.at(-1);
     if (!last || Math.hypot(x - last[0], y - last[1]) > 0.5) path.push([x, y]);
@@ -102,6 +105,10 @@ function take({ heading, points, messages }) {
 }
 
 function takeList(list, time, now) {
+  if (time < world.time) {
+    world.histories.clear();
+    world.trails.clear();
+  }
   world.vehicle = list.egoKnown ? { x: list.egoX, y: list.egoY, yaw: list.egoYaw } : null;
   world.objects = list.objects;
   world.time = time;
@@ -116,13 +123,15 @@ function takeList(list, time, now) {
     const trail = world.trails.get(object.id) ?? { places: [], times: [] };
     trail.places.push([object.x, object.y, object.z]);
     trail.times.push(time);
-    while (trail.times[0] < time - TRAIL_S) {
+    while (trail.times[0] < time - TRAIL_S || trail.times.length > MOST_PLACES) {
       trail.places.shift();
       trail.times.shift();
     }
     world.trails.set(object.id, trail);
   }
-  const isStale = ([id, history]) => Math.abs(time - history.time) > TRAIL_S && id !== world.selected;
+  const excess = world.histories.size - MOST_HISTORIES;
+  const isStale = ([id, history], number) =>
+    number < excess || (time - history.time > TRAIL_S && id !== world.selected);
   for (const [id] of [...world.histories].filter(isStale)) {
     world.histories.delete(id);
     world.trails.delete(id);
@@ -143,6 +152,12 @@ function redraw() {
 
 // The figures change more slowly than the scene.
 function showFigures() {
+  const now = performance.now();
+  arrivals = arrivals.filter((arrival) => now - arrival < 3000);
+  const silence = now - world.heard;
+  if (world.connected && world.pictures > 0 && silence > SILENCE_MS) {
+    say(`no revolution for ${Math.floor(silence / 1000)} s`);
+  }
   const rate = arrivals.length > 1 ? 1000 * (arrivals.length - 1) / (arrivals.at(-1) - arrivals[0]) : 0;
   if (world.status) showStatus(world.status, rate);
   if (world.heading) showSteps(world.heading.steps_ms);
@@ -170,7 +185,7 @@ function showPlayer(player) {
   byId("play").dataset.playing = player.is_playing;
   const seek = byId("seek");
   seek.max = player.duration_s;
-  if (document.activeElement !== seek) seek.value = player.at_s;
+  if (!isSeeking) seek.value = player.at_s;
   byId("at").textContent = `${player.at_s.toFixed(1)} of ${player.duration_s.toFixed(1)} s`;
   byId("speed").value = String(player.speed);
 }
@@ -238,9 +253,10 @@ function listen() {
   byId("back").onclick = () => ask({ step: -1 });
   byId("on").onclick = () => ask({ step: 1 });
   byId("speed").onchange = () => ask({ speed: Number(byId("speed").value) });
+  byId("seek").oninput = () => (isSeeking = true);
   byId("seek").onchange = () => {
+    isSeeking = false;
     ask({ seek: Number(byId("seek").value) });
-    byId("seek").blur();
   };
   matchMedia("(prefers-color-scheme: dark)").onchange = () => {
     readColours();

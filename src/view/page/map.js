@@ -3,6 +3,10 @@
 import { readCells } from "./wire.js";
 
 const UNKNOWN = 7;
+// More than a daemon keeps around the sensor; the ones that were not renewed for longest go.
+const MOST_TILES = 2000;
+// A map whose tiles stay away for so long is not the one that is kept.
+const SILENCE_MS = 2000;
 
 export class GridMap {
   constructor() {
@@ -16,13 +20,17 @@ export class GridMap {
   }
 
   take(tile, colours) {
-    if (this.mapId !== null && tile.mapId < this.mapId) return;
+    const now = performance.now();
+    // Ids are compared as they wrap; a daemon that was started anew may begin with an older one.
+    const isOlder = this.mapId !== null && ((tile.mapId - this.mapId) | 0) < 0;
+    if (isOlder && now - this.heard < SILENCE_MS) return;
+    const levels = readCells(tile);
+    if (!levels) return;
     if (tile.mapId !== this.mapId) {
       this.clear();
       this.mapId = tile.mapId;
     }
-    const levels = readCells(tile);
-    if (!levels) return;
+    this.heard = now;
     this.anchor = { x: tile.anchorX, y: tile.anchorY, yaw: tile.anchorYaw };
     const key = `${tile.tileX} ${tile.tileY}`;
     const known = this.tiles.get(key) ?? { canvas: document.createElement("canvas") };
@@ -32,7 +40,9 @@ export class GridMap {
       west: tile.tileX * tile.side * tile.cellSize,
       south: tile.tileY * tile.side * tile.cellSize,
     });
+    this.tiles.delete(key);
     this.tiles.set(key, known);
+    if (this.tiles.size > MOST_TILES) this.tiles.delete(this.tiles.keys().next().value);
     paint(known, colours);
   }
 
@@ -40,10 +50,12 @@ export class GridMap {
     for (const tile of this.tiles.values()) paint(tile, colours);
   }
 
-  // Draws all tiles; the context's units are metres of the odometry frame, y to the north.
-  draw(context) {
+  // Draws the tiles within a reach of a place; the context's units are metres of the odometry frame, y to the north.
+  draw(context, [x, y], reach) {
     context.imageSmoothingEnabled = false;
-    for (const { canvas, west, south, metres } of this.tiles.values()) {
+    const isNear = ({ west, south, metres }) =>
+      Math.abs(west - x) < reach + metres && Math.abs(south - y) < reach + metres;
+    for (const { canvas, west, south, metres } of [...this.tiles.values()].filter(isNear)) {
       context.save();
       context.transform(1, 0, 0, -1, west, south + metres);
       context.drawImage(canvas, 0, 0, metres, metres);

@@ -86,8 +86,12 @@ export function draw(context, camera, world, colours) {
 
 function drawMap(context, camera, world) {
   context.save();
-  camera.enterPlane(context, world.map.anchor, world.groundZ);
-  world.map.draw(context);
+  const { anchor } = world.map;
+  camera.enterPlane(context, anchor, world.groundZ);
+  const [dx, dy] = [camera.centre.x + camera.offset.x - anchor.x, camera.centre.y + camera.offset.y - anchor.y];
+  const [cosine, sine] = [Math.cos(anchor.yaw), Math.sin(anchor.yaw)];
+  const reach = (camera.width + camera.height) / camera.pixelsPerMetre / Math.max(camera.flat, 0.2);
+  world.map.draw(context, [dx * cosine + dy * sine, dy * cosine - dx * sine], reach);
   context.restore();
 }
 
@@ -103,13 +107,13 @@ function line(context, camera, places) {
   context.stroke();
 }
 
-function drawPoints(context, camera, { points, heading, objects }, colours) {
+function drawPoints(context, camera, { points, heading }, colours) {
   if (!points) return;
   const [east, north, up] = heading.origin_m;
   const size = Math.min(3, Math.max(1.4, camera.pixelsPerMetre * 0.12));
   let last = null;
   for (let point = 0; point < points.count; point++) {
-    const colour = colourOf(points.kind[point], objects, colours);
+    const colour = colourOf(points.kind[point], colours);
     if (colour !== last) context.fillStyle = last = colour;
     const [left, top] = camera.project(
       east + points.x[point] / 100, north + points.y[point] / 100, up + points.z[point] / 100);
@@ -117,12 +121,11 @@ function drawPoints(context, camera, { points, heading, objects }, colours) {
   }
 }
 
-function colourOf(kind, objects, colours) {
+function colourOf(kind, colours) {
   if (kind === 0) return colours.ground;
   if (kind < FIRST_CLUSTER) return colours.loose;
   if (kind < FIRST_OBJECT) return colours.clusters[kind % colours.clusters.length];
-  const object = objects[kind - FIRST_OBJECT];
-  return object ? colours[className(object)] : colours.loose;
+  return colours[CLASSES[kind - FIRST_OBJECT]] ?? colours.loose;
 }
 
 function drawVehicle(context, camera, { vehicle, heading, groundZ }, colours) {

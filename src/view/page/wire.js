@@ -3,7 +3,7 @@
 const u32 = "u32", s32 = "s32", f32 = "f32", f64 = "f64", bool = "bool", text = "text", bytes = "bytes";
 
 // Fields by number, as in kreisel.proto.
-const ENVELOPE = { 1: ["dataType", s32], 2: ["payload", bytes], 5: ["sampled", bytes], 6: ["senderStamp", u32] };
+const ENVELOPE = { 1: ["dataType", s32], 2: ["payload", bytes], 5: ["sampled", bytes] };
 const TIME = { 1: ["seconds", s32], 2: ["microseconds", s32] };
 const OBJECT = {
   1: ["id", u32], 2: ["classification", u32], 3: ["classProbability", f32], 4: ["existence", f32],
@@ -67,6 +67,9 @@ class Reader {
   }
 }
 
+// How a field of each kind is written.
+const WIRES = { u32: 0, s32: 0, bool: 0, f64: 1, f32: 5, text: 2, bytes: 2 };
+
 const isFalse = { u32: 0, s32: 0, f32: 0, f64: 0, bool: false, text: "", bytes: new Uint8Array() };
 
 function decode(array, fields) {
@@ -83,10 +86,12 @@ function decode(array, fields) {
     else if (wire === 5) value = reader.float(4);
     else if (wire === 2) value = reader.take(reader.varint());
     else throw new RangeError(`wire type ${wire} is unknown`);
+    // A field of another type than it should have is passed over, as an unknown one is.
+    if (!name || wire !== WIRES[kind]) continue;
     if (kind === s32) value = value % 2 ? -(value + 1) / 2 : value / 2;
     else if (kind === bool) value = value !== 0;
     else if (kind === text) value = new TextDecoder().decode(value);
-    if (name) message[name] = value;
+    message[name] = value;
   }
   return message;
 }
@@ -98,20 +103,33 @@ function decodeObjects(array) {
   return objects;
 }
 
-// The messages in a row of frames: `0D A4`, a 24-bit length, an envelope.
-function* messages(array) {
-  for (let at = 0; at + 5 <= array.length;) {
-    const length = array[at + 2] | (array[at + 3] << 8) | (array[at + 4] << 16);
-    const envelope = decode(array.subarray(at + 5, at + 5 + length), ENVELOPE);
-    const [kind, fields] = KINDS[envelope.dataType] ?? [];
-    if (kind) {
-      const { seconds, microseconds } = decode(envelope.sampled, TIME);
-      const message = decode(envelope.payload, fields);
-      if (kind === "list") message.objects = decodeObjects(message.objects);
-      yield { kind, senderStamp: envelope.senderStamp, time: seconds + microseconds / 1e6, message };
-    }
-    at += 5 + length;
+// The messages in a row of frames: `0D A4`, a 24-bit length, an envelope. A damaged one costs no other.
+export function* messages(array) {
+  for (let at = 0; at + 5 <= array.length && array[at] === 0x0d && array[at + 1] === 0xa4;) {
+    const begin = at + 5;
+    at = begin + (array[at + 2] | (array[at + 3] << 8) | (array[at + 4] << 16));
+    const message = attempt(() => decodeEnvelope(array.subarray(begin, at)));
+    if (message) yield message;
   }
+}
+
+function attempt(action) {
+  try {
+    return action();
+  } catch (error) {
+    if (error instanceof RangeError) return null;
+    throw error;
+  }
+}
+
+function decodeEnvelope(array) {
+  const { dataType, sampled, payload } = decode(array, ENVELOPE);
+  const [kind, fields] = KINDS[dataType] ?? [];
+  if (!kind) return null;
+  const { seconds, microseconds } = decode(sampled, TIME);
+  const message = decode(payload, fields);
+  if (kind === "list") message.objects = decodeObjects(message.objects);
+  return { kind, time: seconds + microseconds / 1e6, message };
 }
 
 // A picture: heading, points, messages (the layout is in picture.rs).
@@ -129,14 +147,17 @@ export function readPicture(buffer) {
   return { heading, points, messages: [...messages(new Uint8Array(buffer, begin + 7 * count))] };
 }
 
+// Tiles of a daemon have 64 cells a side.
+const LARGEST_SIDE = 128;
+
 // Levels of a tile's cells from 0 to 14, 7 is unknown, row by row from the south-west corner.
 export function readCells({ encoding, side, cells }) {
-  if (encoding !== 1 || side < 1 || side > 1024) return null;
+  if (encoding !== 1 || side < 1 || side > LARGEST_SIDE) return null;
   const levels = new Uint8Array(side * side);
   const reader = new Reader(cells);
   for (let cell = 0; cell < levels.length;) {
-    if (reader.isAtEnd) return null;
-    const run = reader.varint();
+    const run = attempt(() => reader.varint());
+    if (run === null) return null;
     const end = cell + Math.floor(run / 16);
     if (end === cell || end > levels.length) return null;
     for (; cell < end; cell++) {
