@@ -1,6 +1,6 @@
 //! Why an envelope was of no use, and how often.
 
-use crate::cloud::Refusal;
+use crate::cloud::{PacketRefusal, Refusal};
 use crate::tally::Tally;
 use crate::wire::WireError;
 
@@ -18,6 +18,9 @@ pub enum Fault {
     /// A point cloud that is no whole revolution, or that the array cannot hold.
     #[error("point cloud refused: {0}")]
     Refused(#[from] Refusal),
+    /// A packet of a sensor that is of no use.
+    #[error(transparent)]
+    Packet(#[from] PacketRefusal),
     /// A pose whose numbers cannot be a vehicle's on the earth.
     #[error("message {data_type}: its numbers are no pose on the earth")]
     ImplausiblePose {
@@ -32,6 +35,7 @@ impl Fault {
         match self {
             Self::Damaged { error, .. } => error.name(),
             Self::Refused(refusal) => refusal.name(),
+            Self::Packet(refusal) => refusal.name(),
             Self::ImplausiblePose { .. } => "pose_implausible",
         }
     }
@@ -40,7 +44,13 @@ impl Fault {
 /// What was counted since the beginning.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Point clouds handed in.
+    /// Packets of a sensor handed in.
+    pub packets: u64,
+    /// Packets that never came.
+    pub packets_lost: u64,
+    /// Packets that came late and were put in their place.
+    pub packets_late: u64,
+    /// Point clouds handed in, and revolutions that packets closed.
     pub revolutions: u64,
     /// Point clouds refused.
     pub refused: u64,

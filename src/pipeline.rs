@@ -1,7 +1,7 @@
 //! All the steps, in order. This is the one place that names them all.
 
 use crate::beams::Beams;
-use crate::cloud::{Extent, Intake, OwnVehicle, Revolution, Scan};
+use crate::cloud::{Dialect, Extent, Intake, OwnVehicle, PacketIntake, Scan};
 use crate::cluster::Dbscan;
 use crate::config::Configuration;
 use crate::ego::{Ego, Heard, Placement, Sweep};
@@ -12,6 +12,8 @@ use crate::time::Time;
 use crate::track::{Object, Scene, Tracker};
 use crate::wire::point_cloud::{CompactPointCloud, POINT_CLOUD_ID};
 use crate::wire::status::Status;
+use crate::wire::velodyne::Packet;
+use crate::wire::velodyne::captured::SensorPackets;
 use crate::wire::{Envelope, Message, pose};
 
 pub use crate::fault::{Counts, Fault};
@@ -41,6 +43,7 @@ const POSE_IDS: [i32; 7] = [
 pub struct Pipeline {
     configuration: Configuration,
     intake: Intake,
+    packets: PacketIntake,
     scan: Scan,
     own_vehicle: OwnVehicle,
     ego: Ego,
@@ -64,6 +67,7 @@ impl Pipeline {
     pub fn new(configuration: &Configuration, sender_stamp: u32) -> Self {
         Self {
             intake: Intake::default(),
+            packets: PacketIntake::default(),
             scan: Scan::default(),
             own_vehicle: OwnVehicle::default(),
             ego: Ego::new(&configuration.ego),
@@ -107,15 +111,54 @@ impl Pipeline {
     ) -> Result<Outcome, Fault> {
         let outcome = self.dispatch(envelope, done);
         if let Err(fault) = &outcome {
-            self.counts.faults.count(fault.name());
-            match fault {
-                Fault::Refused(_) => self.counts.refused += 1,
-                Fault::Damaged { .. } | Fault::ImplausiblePose { .. } => {
-                    self.counts.damaged += 1;
-                }
-            }
+            self.count(fault);
         }
         outcome
+    }
+
+    fn count(&mut self, fault: &Fault) {
+        self.counts.faults.count(fault.name());
+        match fault {
+            Fault::Refused(_) => self.counts.refused += 1,
+            Fault::Packet(refusal) => self.counts.damaged += u64::from(refusal.is_damage()),
+            Fault::Damaged { .. } | Fault::ImplausiblePose { .. } => self.counts.damaged += 1,
+        }
+    }
+
+    /// Takes one packet as a sensor sends it. Gives whether it closes a revolution, which
+    /// [`Pipeline::perceive_packets`] then goes through; it is replaced by the next one.
+    ///
+    /// # Errors
+    /// [`Fault`] when the packet, or the revolution that it closes, is of no use. It is counted.
+    pub fn take_packet(&mut self, packet: &Packet<'_>) -> Result<bool, Fault> {
+        let result = self.take_counted(packet);
+        if let Err(fault) = &result {
+            self.count(fault);
+        }
+        result
+    }
+
+    fn take_counted(&mut self, packet: &Packet<'_>) -> Result<bool, Fault> {
+        self.counts.packets += 1;
+        let taken = self.packets.take(packet, &self.configuration.cloud)?;
+        self.counts.packets_lost += taken.lost;
+        self.counts.packets_late += u64::from(taken.is_late);
+        let Some(closed) = taken.closed else {
+            return Ok(false);
+        };
+        self.counts.revolutions += 1;
+        closed?;
+        Ok(true)
+    }
+
+    /// Perceives the last revolution that packets have closed, and says after each step which one is
+    /// done.
+    pub fn perceive_packets(&mut self, done: impl FnMut(Step)) -> RevolutionReport {
+        let revolution = self.packets.revolution(&self.configuration.cloud);
+        self.scan
+            .fill(&revolution, &self.own_vehicle, &self.configuration.cloud);
+        let (dialect, time_jumped) = (revolution.dialect, revolution.time_jumped);
+        self.perceive(dialect, time_jumped, done)
     }
 
     fn dispatch(
@@ -134,7 +177,19 @@ impl Pipeline {
             let accepted = self
                 .intake
                 .accept(envelope, cloud, &self.configuration.cloud)?;
-            return Ok(Outcome::Revolution(self.perceive(&accepted, done)));
+            self.scan
+                .fill(&accepted, &self.own_vehicle, &self.configuration.cloud);
+            let (dialect, time_jumped) = (accepted.dialect, accepted.time_jumped);
+            return Ok(Outcome::Revolution(self.perceive(
+                dialect,
+                time_jumped,
+                done,
+            )));
+        }
+        if envelope.data_type == SensorPackets::ID {
+            let packets = SensorPackets::decode(envelope.payload, envelope.payload_offset)
+                .map_err(damaged)?;
+            return self.dispatch_packets(&packets, done);
         }
         if OWN_IDS.contains(&envelope.data_type) {
             return Ok(Outcome::Own);
@@ -151,29 +206,54 @@ impl Pipeline {
         }
     }
 
-    /// One revolution through all the steps.
+    /// Packets of a recording, of which the last one closes a revolution. The first fault is told; all are counted.
+    fn dispatch_packets(
+        &mut self,
+        packets: &SensorPackets,
+        done: impl FnMut(Step),
+    ) -> Result<Outcome, Fault> {
+        let (mut is_closed, mut fault) = (false, None);
+        for packet in packets.iter() {
+            match self.take_counted(&packet) {
+                Ok(closes) => is_closed |= closes,
+                // The caller counts the one that it is told.
+                Err(first) if fault.is_none() => fault = Some(first),
+                Err(other) => self.count(&other),
+            }
+        }
+        match fault {
+            _ if is_closed => {
+                fault.iter().for_each(|fault| self.count(fault));
+                Ok(Outcome::Revolution(self.perceive_packets(done)))
+            }
+            Some(fault) => Err(fault),
+            None => Ok(Outcome::Packets),
+        }
+    }
+
+    /// The revolution in the array through all the other steps.
     fn perceive(
         &mut self,
-        revolution: &Revolution<'_>,
+        dialect: Dialect,
+        time_jumped: bool,
         mut done: impl FnMut(Step),
     ) -> RevolutionReport {
-        if revolution.time_jumped {
+        done(Step::Cloud);
+        if time_jumped {
             self.ego.reset();
             self.ground.reset();
             self.beams.reset();
             self.tracker.reset();
             self.grid.reset();
         }
-        self.scan
-            .fill(revolution, &self.own_vehicle, &self.configuration.cloud);
-        done(Step::Cloud);
+        let time = self.scan.time();
         let expected = self.ego.expect(&self.scan);
-        let moving = self.tracker.expect_moving(revolution.time, &expected);
+        let moving = self.tracker.expect_moving(time, &expected);
         let sweep = self.ego.follow(&self.scan, moving);
         done(Step::Ego);
         self.sweep = sweep;
         sweep.placements(self.scan.columns(), &mut self.placements);
-        let driving = self.tracker.expect_driving(revolution.time, &sweep);
+        let driving = self.tracker.expect_driving(time, &sweep);
         let ground = self.ground.process(&self.scan, driving);
         let way_m = sweep.way_m();
         self.own_vehicle.learn(
@@ -199,7 +279,7 @@ impl Pipeline {
         self.objects.clear();
         let in_local_frame = |object: &Object| object.in_local_frame(&sweep.anchor);
         self.objects.extend(objects.iter().map(in_local_frame));
-        let moving = self.tracker.expect_moving(revolution.time, &sweep);
+        let moving = self.tracker.expect_moving(time, &sweep);
         let ground_mask = self.ground.mask();
         self.beams
             .remember(&self.scan, ground_mask, moving, &sweep, &self.placements);
@@ -207,12 +287,12 @@ impl Pipeline {
 
         let report = RevolutionReport {
             number: self.last.map_or(0, |last| last.number.wrapping_add(1)),
-            time: revolution.time,
-            time_jumped: revolution.time_jumped,
-            sensor: revolution.sensor.name,
-            dialect: revolution.dialect,
+            time,
+            time_jumped,
+            sensor: self.scan.sensor().name,
+            dialect,
             columns: self.scan.columns(),
-            rotation_hz: revolution.step_deg.abs() / (360.0 * revolution.sensor.column_period_s),
+            rotation_hz: self.scan.rotation_hz(),
             returns: self.scan.returns(),
             ground,
             vehicle: sweep.vehicle,
@@ -272,6 +352,11 @@ impl Pipeline {
         self.publisher.frames()
     }
 
+    /// What is known of the sensor whose packets are taken.
+    pub fn packets(&self) -> &PacketIntake {
+        &self.packets
+    }
+
     /// The last revolution's points.
     pub fn scan(&self) -> &Scan {
         &self.scan
@@ -324,6 +409,9 @@ impl Pipeline {
             revolutions_published: self.last.map_or(0, |last| u64::from(last.number) + 1),
             revolutions_refused: self.counts.refused,
             datagrams_damaged: self.counts.damaged,
+            packets_received: self.counts.packets,
+            packets_lost: self.counts.packets_lost,
+            packets_late: self.counts.packets_late,
             poses_received: self.counts.poses,
             faults: self.counts.faults.to_string(),
             ground_held: self.counts.ground_held,
@@ -349,6 +437,10 @@ impl Pipeline {
             status.pose_source = last.ego.source.into();
             status.pose_disagreement = last.ego.disagreement_m as f32;
             status.pose_jumps = last.ego.jumps;
+        }
+        if let Some(mode) = self.packets.mode() {
+            status.return_mode = mode.name().into();
+            status.sensor_clock = self.packets.clock().name().into();
         }
         if let Some(extent) = self.own_vehicle.extent() {
             [status.own_vehicle_left, status.own_vehicle_back, _] = extent.low_m;

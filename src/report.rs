@@ -14,6 +14,8 @@ use crate::time::Time;
 pub enum Outcome {
     /// A revolution that is to be answered.
     Revolution(RevolutionReport),
+    /// Packets of a sensor that close no revolution.
+    Packets,
     /// A pose of the vehicle.
     Pose,
     /// Our own message, heard back.

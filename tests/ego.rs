@@ -4,7 +4,9 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use kreisel::cloud::sensor::VLP16;
-use kreisel::cloud::{ByteOrderSource, CloudParameters, Dialect, OwnVehicle, Revolution, Scan};
+use kreisel::cloud::{
+    ByteOrderSource, CloudParameters, Dialect, OwnVehicle, Revolution, Scan, Source,
+};
 use kreisel::ego::geodesy::{Geodetic, LocalFrame};
 use kreisel::ego::{Ego, EgoParameters, Frame, HeadingUnit, Heard, Sweep};
 use kreisel::parameter::Profile;
@@ -60,11 +62,13 @@ fn blind(end_s: f64) -> Scan {
     const COLUMNS: usize = 1808;
     let mut scan = Scan::default();
     let revolution = Revolution {
-        cloud: CompactPointCloud {
+        source: Source::Cloud(CompactPointCloud {
             layers: 16,
             distances: &[0; 32 * COLUMNS],
             ..CompactPointCloud::default()
-        },
+        }),
+        columns: COLUMNS,
+        column_period_s: VLP16.column_period_s,
         sensor: &VLP16,
         dialect: Dialect {
             byte_order: ByteOrder::Big,

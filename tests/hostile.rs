@@ -102,7 +102,7 @@ impl Session {
         match &result {
             Ok(Outcome::Revolution(_)) => self.check_answer(envelope),
             Ok(Outcome::Pose) => self.poses += 1,
-            Ok(Outcome::Own | Outcome::Other) => {}
+            Ok(Outcome::Own | Outcome::Other | Outcome::Packets) => {}
             Err(fault) => *self.faults.entry(fault.name()).or_default() += 1,
         }
         result

@@ -129,7 +129,8 @@ fn next(socket: &mut WebSocket<TcpStream>) -> Picture {
         let length = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
         let json = length(0);
         let points = length(4 + json);
-        let frames = &bytes[8 + json + 7 * points..];
+        let bright = 8 + json + 7 * points;
+        let frames = &bytes[bright + 4 + length(bright)..];
         let (mut lists, mut statuses, mut tiles) = (vec![], vec![], 0);
         for entry in Recording::new(frames) {
             let envelope = entry.unwrap().envelope;

@@ -16,6 +16,8 @@ pub(super) struct RangeImage {
     /// Negative on the ground, which a ray ends on without meeting anything; 0 where nothing is known, and not a number
     /// where something moved: what came and went says nothing of what stands.
     range_m: Vec<f32>,
+    /// How far rays went beyond that; empty where pulses have one return.
+    reached_m: Vec<f32>,
     placements: Vec<Placement>,
     /// Sine and cosine of the columns' azimuths.
     directions: Vec<[f32; 2]>,
@@ -69,6 +71,10 @@ impl RangeImage {
                 range_m.max(0.0)
             }
         }));
+        self.reached_m.clear();
+        if scan.has_two_returns() {
+            self.reached_m.extend_from_slice(scan.reached_m());
+        }
         moving
             .iter()
             .for_each(|rectangle| self.leave_out(scan, rectangle));
@@ -180,11 +186,19 @@ impl RangeImage {
     fn ask(&self, layer: usize, place: &Place) -> Answer {
         let mut answer = Answer::default();
         for column in place.columns {
-            let range_m = self.range_m[column * MAX_LAYERS + layer];
+            let point = column * MAX_LAYERS + layer;
+            let range_m = self.range_m[point];
+            let reached_m = self
+                .reached_m
+                .get(point)
+                .map_or(range_m, |reached_m| *reached_m);
+            let met = place.near_m..=place.far_m;
             if range_m.abs() > place.far_m {
                 answer.passed += 1;
-            } else if range_m >= place.near_m {
+            } else if met.contains(&range_m) || met.contains(&reached_m) {
                 answer.met = true;
+            } else if reached_m > place.far_m {
+                answer.passed += 1;
             } else if range_m > 0.0 {
                 answer.is_blocked = true;
             }

@@ -1,9 +1,10 @@
-//! Captures of VLP-16 packets, pcap or pcapng, as the envelopes that the device service makes of them.
+//! Captures of VLP-16 packets, pcap or pcapng: as a recording of them, or of the point clouds that the
+//! device service makes of them.
 
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use etherparse::{SlicedPacket, TransportSlice};
+use etherparse::{LaxNetSlice, LaxSlicedPacket, NetSlice, SlicedPacket, TransportSlice};
 use pcap_parser::traits::PcapNGPacketBlock as _;
 use pcap_parser::{Block, Linktype, PcapBlockOwned, PcapError, create_reader};
 
@@ -12,7 +13,10 @@ use super::files::progress;
 use crate::time::Time;
 use crate::wire::envelope::Postmark;
 use crate::wire::point_cloud::POINT_CLOUD_ID;
-use crate::wire::vlp16_packet::{PACKET_LEN, SweepAssembler};
+use crate::wire::velodyne::captured::SensorPackets;
+use crate::wire::velodyne::data::{self, BLOCKS, DataPacket, ReturnMode};
+use crate::wire::velodyne::device_service::SweepAssembler;
+use crate::wire::velodyne::{Packet, position};
 
 /// Largest record that is read; a jumbo frame has 9 kB.
 const LARGEST_RECORD: usize = 1 << 20;
@@ -31,18 +35,137 @@ pub(super) fn is_capture(bytes: &[u8]) -> bool {
     MAGICS.iter().any(|magic| bytes.starts_with(magic))
 }
 
-/// One captured packet.
+/// One captured frame.
 struct Captured<'a> {
     time: Time,
     link: Linktype,
     bytes: &'a [u8],
 }
 
-/// What is in a capture.
+/// The packets of sensors in a capture, in order.
 #[derive(Default)]
 pub(super) struct Capture {
+    packets: SensorPackets,
+    /// Data packets among them.
+    data_packets: u64,
+    /// Frames that are not whole.
+    cut: u64,
+    /// What ended it early, if anything did.
+    damage: Option<String>,
+}
+
+impl Capture {
+    /// Reads the capture that a file holds.
+    ///
+    /// # Errors
+    /// When there is no data packet of a VLP-16 in it.
+    pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Self> {
+        let (mut capture, bar) = (Self::default(), progress(bytes.len(), "bytes"));
+        capture.damage = walk(bytes, |offset, captured| {
+            bar.set_position(offset as u64);
+            capture.take(&captured);
+        });
+        bar.finish_and_clear();
+        if capture.data_packets == 0 {
+            let nothing = || "byte 0: no VLP-16 data packets".into();
+            let problem = capture.damage.unwrap_or_else(nothing);
+            bail!("{}: {problem}", path.display());
+        }
+        Ok(capture)
+    }
+
+    fn take(&mut self, captured: &Captured<'_>) {
+        let Ok(found) = udp(captured) else {
+            self.cut += 1;
+            return;
+        };
+        let Some((source, bytes)) = found else {
+            return;
+        };
+        if bytes.len() == data::PACKET_LEN || bytes.len() == position::PACKET_LEN {
+            self.data_packets += u64::from(bytes.len() == data::PACKET_LEN);
+            self.packets.push(&Packet {
+                source,
+                arrival: captured.time,
+                bytes,
+            });
+        }
+    }
+
+    /// Its packets.
+    pub(super) fn packets(&self) -> &SensorPackets {
+        &self.packets
+    }
+
+    /// The packets as a recording, a message a revolution.
+    pub(super) fn recording(&self) -> Vec<u8> {
+        let (mut frames, mut message) = (vec![], SensorPackets::default());
+        let mut last = None;
+        let mut put = |message: &mut SensorPackets, time| {
+            let postmark = Postmark {
+                sent: time,
+                sampled: time,
+                sender_stamp: 0,
+            };
+            postmark.put(&mut frames, message);
+            message.packets.0.clear();
+        };
+        for packet in self.packets.iter() {
+            message.push(&packet);
+            let end = DataPacket::new(packet.bytes).map(|data| data.azimuth(BLOCKS - 1));
+            let (Ok(end), before) = (end, last) else {
+                continue;
+            };
+            last = end;
+            if end < before {
+                put(&mut message, packet.arrival);
+            }
+        }
+        if let Some(packet) = message.iter().last() {
+            let time = packet.arrival;
+            put(&mut message, time);
+        }
+        frames
+    }
+
+    /// The point clouds that the device service makes of the packets of the first sensor.
+    pub(super) fn clouds(&self, sender_stamp: u32) -> Clouds {
+        let mut clouds = Clouds::default();
+        for packet in self.packets.iter() {
+            if packet.bytes.len() == data::PACKET_LEN {
+                clouds.take(sender_stamp, &packet);
+            }
+        }
+        clouds
+    }
+
+    /// Whether all of it could be read.
+    pub(super) fn completion(&self) -> Completion {
+        if self.damage.is_some() || self.cut > 0 {
+            Completion::Damaged
+        } else {
+            Completion::Done
+        }
+    }
+
+    /// Says what could not be read.
+    pub(super) fn warn(&self, path: &Path) {
+        let path = path.display();
+        if self.cut > 0 {
+            let cut = self.cut;
+            tell!("kreisel: {path}: {cut} packets that are no whole frames left out");
+        }
+        if let Some(problem) = &self.damage {
+            tell!("kreisel: {path}: {problem}; the rest is skipped");
+        }
+    }
+}
+
+/// Point clouds as the device service sends them.
+#[derive(Default)]
+pub(super) struct Clouds {
     assembler: SweepAssembler,
-    source: Option<Vec<u8>>,
+    source: Option<[u8; 4]>,
     /// The revolutions, one frame after the other.
     pub(super) frames: Vec<u8>,
     /// Where the first of them ends, which began somewhere on the circle.
@@ -53,32 +176,10 @@ pub(super) struct Capture {
     pub(super) revolutions: u64,
     other_sources: u64,
     broken: u64,
-    cut: u64,
     dual_returns: u64,
-    /// What ended it early, if anything did.
-    damage: Option<String>,
 }
 
-impl Capture {
-    /// Reads the capture that a file holds; its envelopes bear a senderStamp.
-    ///
-    /// # Errors
-    /// When there is no data packet of a VLP-16 in it.
-    pub(super) fn read(path: &Path, bytes: &[u8], sender_stamp: u32) -> Result<Self> {
-        let (mut capture, bar) = (Self::default(), progress(bytes.len(), "bytes"));
-        capture.damage = walk(bytes, |offset, captured| {
-            bar.set_position(offset as u64);
-            capture.take(sender_stamp, &captured);
-        });
-        bar.finish_and_clear();
-        if capture.packets == 0 {
-            let nothing = || "byte 0: no VLP-16 data packets".into();
-            let problem = capture.damage.unwrap_or_else(nothing);
-            bail!("{}: {problem}", path.display());
-        }
-        Ok(capture)
-    }
-
+impl Clouds {
     /// Its revolutions without the first one, of which only the end was captured.
     pub(super) fn whole_revolutions(mut self) -> Vec<u8> {
         self.frames.split_off(self.first_end)
@@ -89,43 +190,32 @@ impl Capture {
         self.assembler.pending_columns()
     }
 
-    /// Whether all of it could be read.
+    /// Whether all packets could be read.
     pub(super) fn completion(&self) -> Completion {
-        if self.damage.is_some() || self.broken + self.cut > 0 {
+        if self.broken > 0 {
             Completion::Damaged
         } else {
             Completion::Done
         }
     }
 
-    fn take(&mut self, sender_stamp: u32, captured: &Captured<'_>) {
-        const RETURN_MODE_AT: usize = 1204;
-        const DUAL_RETURN: u8 = 0x39;
-        let Ok(found) = udp(captured) else {
-            self.cut += 1;
-            return;
-        };
-        let Some((source, payload)) = found else {
-            return;
-        };
-        if payload.len() != PACKET_LEN {
-            return;
-        }
-        if *self.source.get_or_insert_with(|| source.clone()) != source {
+    fn take(&mut self, sender_stamp: u32, packet: &Packet<'_>) {
+        if *self.source.get_or_insert(packet.source) != packet.source {
             self.other_sources += 1;
             return;
         }
         self.packets += 1;
-        self.dual_returns += u64::from(payload[RETURN_MODE_AT] == DUAL_RETURN);
-        let Ok(sweeps) = self.assembler.take(payload) else {
+        let mode = DataPacket::new(packet.bytes).map(|data| data.return_mode());
+        self.dual_returns += u64::from(mode == Ok(Some(ReturnMode::Dual)));
+        let Ok(sweeps) = self.assembler.take(packet.bytes) else {
             self.broken += 1;
             return;
         };
         for sweep in sweeps {
             // The packet that closes a revolution gives it its time.
             let postmark = Postmark {
-                sent: captured.time,
-                sampled: captured.time,
+                sent: packet.arrival,
+                sampled: packet.arrival,
                 sender_stamp,
             };
             postmark.put_payload(&mut self.frames, POINT_CLOUD_ID, |out| {
@@ -144,7 +234,6 @@ impl Capture {
         for (count, what) in [
             (self.other_sources, "packets of other sensors left out"),
             (self.broken, "packets without block flags left out"),
-            (self.cut, "packets that are no whole frames left out"),
             (
                 self.dual_returns,
                 "packets in dual return mode, which the device service takes for more columns",
@@ -153,9 +242,6 @@ impl Capture {
             if count > 0 {
                 tell!("kreisel: {path}: {count} {what}");
             }
-        }
-        if let Some(problem) = &self.damage {
-            tell!("kreisel: {path}: {problem}; the rest is skipped");
         }
     }
 }
@@ -257,23 +343,37 @@ fn micros(ticks: u64, resolution: u8) -> Option<i64> {
     i64::try_from(u128::from(ticks) * 1_000_000 / per_second).ok()
 }
 
-/// Source and payload, if it is a UDP packet; an error if it is cut or damaged.
-fn udp<'a>(captured: &Captured<'a>) -> Result<Option<(Vec<u8>, &'a [u8])>> {
+/// Source and payload, if it is a UDP packet over IPv4, which sensors send; an error if it is cut or damaged.
+fn udp<'a>(captured: &Captured<'a>) -> Result<Option<([u8; 4], &'a [u8])>> {
     let packet = match captured.link {
-        Linktype::ETHERNET => SlicedPacket::from_ethernet(captured.bytes)?,
-        Linktype::LINUX_SLL => SlicedPacket::from_linux_sll(captured.bytes)?,
-        Linktype::RAW | Linktype::IPV4 => SlicedPacket::from_ip(captured.bytes)?,
+        Linktype::ETHERNET => SlicedPacket::from_ethernet(captured.bytes),
+        Linktype::LINUX_SLL => SlicedPacket::from_linux_sll(captured.bytes),
+        Linktype::RAW | Linktype::IPV4 => SlicedPacket::from_ip(captured.bytes),
         _ => return Ok(None),
     };
-    let source = match &packet.net {
-        Some(etherparse::NetSlice::Ipv4(ip)) => ip.header().source().to_vec(),
-        Some(etherparse::NetSlice::Ipv6(ip)) => ip.header().source().to_vec(),
-        _ => return Ok(None),
+    let packet = match packet {
+        Ok(packet) => packet,
+        Err(error) => return position(captured).map(Some).ok_or(error.into()),
     };
-    Ok(match packet.transport {
-        Some(TransportSlice::Udp(udp)) => Some((source, udp.payload())),
+    let (Some(NetSlice::Ipv4(ip)), Some(TransportSlice::Udp(udp))) =
+        (&packet.net, &packet.transport)
+    else {
+        return Ok(None);
+    };
+    Ok(Some((ip.header().source(), udp.payload())))
+}
+
+/// A position packet of early firmware, whose IP header says that it is longer than it is.
+fn position<'a>(captured: &Captured<'a>) -> Option<([u8; 4], &'a [u8])> {
+    let packet = LaxSlicedPacket::from_ethernet(captured.bytes).ok()?;
+    match (&packet.net, &packet.transport) {
+        (Some(LaxNetSlice::Ipv4(ip)), Some(TransportSlice::Udp(udp)))
+            if udp.payload().len() == position::PACKET_LEN =>
+        {
+            Some((ip.header().source(), udp.payload()))
+        }
         _ => None,
-    })
+    }
 }
 
 #[cfg(test)]

@@ -25,16 +25,18 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let bytes = files::read(&arguments.input)?;
     files::check_distinct(&arguments.input, &[Some(&arguments.output)])?;
-    let capture = Capture::read(&arguments.input, &bytes, arguments.id)?;
+    let capture = Capture::read(&arguments.input, &bytes)?;
+    let clouds = capture.clouds(arguments.id);
     let mut output = Output::create(&arguments.output)?;
-    output.put(&capture.frames)?;
+    output.put(&clouds.frames)?;
     output.finish()?;
     say!(
         "{} packets, {} revolutions; {} columns after the last one not sent",
-        capture.packets,
-        capture.revolutions,
-        capture.pending_columns(),
+        clouds.packets,
+        clouds.revolutions,
+        clouds.pending_columns(),
     );
+    clouds.warn(&arguments.input);
     capture.warn(&arguments.input);
-    Ok(capture.completion())
+    Ok(capture.completion().and(clouds.completion()))
 }

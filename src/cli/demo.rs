@@ -10,7 +10,8 @@ use clap::Args;
 use super::run::serve_view;
 use super::{Completion, block_on, simulate, stop_signal};
 use crate::config::Configuration;
-use crate::daemon::session::{Datagram, Session};
+use crate::daemon::listener::Datagram;
+use crate::daemon::session::Session;
 use crate::daemon::{self, Options};
 use crate::simulate::scenario::Scenario;
 use crate::track::Class;
@@ -60,7 +61,9 @@ async fn demonstrate(arguments: &Arguments) -> Result<()> {
         None => "Its view could not be served; the log says why.".into(),
     };
     let options = Options {
-        session,
+        session: Some(session),
+        sensor: None,
+        publish_cloud: false,
         sender_stamp: SENDER_STAMP,
         configuration,
         view,

@@ -17,17 +17,47 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
     std::fs::read(path).with_context(|| path.display().to_string())
 }
 
-/// A recording as a whole, or the whole revolutions of a capture of VLP-16 packets, found from its
-/// first bytes; and whether parts of a capture could not be read, which is then said.
-pub(super) fn read_recording(path: &Path) -> Result<(Vec<u8>, Completion)> {
-    let bytes = read(path)?;
-    if !capture::is_capture(&bytes) {
-        return Ok((bytes, Completion::Done));
+/// What is read as a recording; which it is, is found from its first bytes.
+pub(super) enum Recorded {
+    /// Frames end to end.
+    Recording(Vec<u8>),
+    /// Packets of a VLP-16.
+    Capture(Capture),
+}
+
+impl Recorded {
+    /// Reads a file. What of a capture could not be read is said.
+    pub(super) fn read(path: &Path) -> Result<Self> {
+        let bytes = read(path)?;
+        if !capture::is_capture(&bytes) {
+            return Ok(Self::Recording(bytes));
+        }
+        let capture = Capture::read(path, &bytes)?;
+        capture.warn(path);
+        Ok(Self::Capture(capture))
     }
-    let capture = Capture::read(path, &bytes, 0)?;
-    capture.warn(path);
-    let completion = capture.completion();
-    Ok((capture.whole_revolutions(), completion))
+
+    /// The recording, of which a capture's packets are messages; and whether all of it could be read.
+    pub(super) fn with_packets(self) -> (Vec<u8>, Completion) {
+        match self {
+            Self::Recording(bytes) => (bytes, Completion::Done),
+            Self::Capture(capture) => (capture.recording(), capture.completion()),
+        }
+    }
+
+    /// The recording, in which a capture's packets are the point clouds that a device service would make of them; and
+    /// whether all of it could be read.
+    pub(super) fn with_clouds(self, path: &Path) -> (Vec<u8>, Completion) {
+        match self {
+            Self::Recording(bytes) => (bytes, Completion::Done),
+            Self::Capture(capture) => {
+                let clouds = capture.clouds(0);
+                clouds.warn(path);
+                let completion = capture.completion().and(clouds.completion());
+                (clouds.whole_revolutions(), completion)
+            }
+        }
+    }
 }
 
 /// The configuration in a file, or the default one.

@@ -7,18 +7,20 @@ use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 
-use super::{Completion, files};
+use super::Completion;
+use super::files::Recorded;
 use crate::cloud::{Intake, sensor, shown_order};
 use crate::config::Configuration;
 use crate::pipeline::Pipeline;
 use crate::time::Time;
 use crate::wire::point_cloud::{ByteOrder, CompactPointCloud, POINT_CLOUD_ID, Schema};
 use crate::wire::recording::Entry;
-use crate::wire::{Recording, known_name};
+use crate::wire::velodyne::captured::SensorPackets;
+use crate::wire::{Message as _, Recording, known_name};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Recording to look into.
+    /// Recording or capture (pcap, pcapng) to look into.
     #[arg(value_name = "FILE")]
     input: PathBuf,
     /// As JSON.
@@ -33,6 +35,8 @@ struct Report {
     duration_s: f64,
     messages: Vec<MessageReport>,
     point_clouds: Vec<CloudReport>,
+    /// What a sensor itself sent, if that was captured.
+    packets: Option<PacketsReport>,
     own_vehicle: Option<OwnVehicleReport>,
     damage: Vec<DamageReport>,
 }
@@ -70,6 +74,22 @@ struct CloudReport {
     refused: Option<String>,
 }
 
+/// Packets of a sensor, and what the daemon makes of them.
+#[derive(Debug, Serialize)]
+struct PacketsReport {
+    count: u64,
+    lost: u64,
+    sensor: String,
+    return_mode: String,
+    rotation_hz: f32,
+    /// Whether a GPS receiver keeps the sensor's time; see `kreisel.Status`.
+    clock: String,
+    /// How far that is ahead of the time of the packets' arrival.
+    clock_ahead_s: f64,
+    revolutions: u64,
+    refused: String,
+}
+
 /// How far the own vehicle is seen in the sensor frame.
 #[derive(Debug, Serialize)]
 struct OwnVehicleReport {
@@ -90,8 +110,14 @@ struct DamageReport {
 const MOST_CLOUD_LINES: usize = 20;
 
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
-    let (bytes, completion) = files::read_recording(&arguments.input)?;
-    let report = inspect(&bytes);
+    let recorded = Recorded::read(&arguments.input)?;
+    let packets = match &recorded {
+        Recorded::Capture(capture) => inspect_packets(&capture.recording()),
+        Recorded::Recording(bytes) => inspect_packets(bytes),
+    };
+    let (bytes, completion) = recorded.with_clouds(&arguments.input);
+    let mut report = inspect(&bytes);
+    report.packets = packets;
     if arguments.json {
         say!("{}", serde_json::to_string_pretty(&report)?);
     } else {
@@ -157,6 +183,31 @@ fn inspect(bytes: &[u8]) -> Report {
         .map(MessageReport::finished)
         .collect();
     report
+}
+
+/// What is in a capture beside the point clouds that a device service would make of it.
+fn inspect_packets(recording: &[u8]) -> Option<PacketsReport> {
+    let mut configuration = Configuration::default();
+    configuration.grid.enabled = false;
+    let mut pipeline = Pipeline::new(&configuration, 0);
+    for entry in Recording::new(recording).flatten() {
+        if entry.envelope.data_type == SensorPackets::ID {
+            // What is refused is told by its count.
+            let _ = pipeline.handle(&entry.envelope);
+        }
+    }
+    let status = pipeline.status();
+    (status.packets_received > 0).then(|| PacketsReport {
+        count: status.packets_received,
+        lost: status.packets_lost,
+        sensor: status.sensor,
+        return_mode: status.return_mode,
+        rotation_hz: status.rotation_rate,
+        clock: status.sensor_clock,
+        clock_ahead_s: pipeline.packets().clock_ahead().seconds(),
+        revolutions: status.revolutions_published,
+        refused: status.faults,
+    })
 }
 
 impl MessageReport {
@@ -279,6 +330,30 @@ fn print(report: &Report) -> Result<()> {
         say!(
             "{} point clouds, {refused} refused",
             report.point_clouds.len()
+        );
+    }
+    if let Some(packets) = &report.packets {
+        say!(
+            "{} packets of a {}, {} lost; {} whole revolutions at {:.1} Hz{}",
+            packets.count,
+            if packets.sensor.is_empty() {
+                "sensor"
+            } else {
+                &packets.sensor
+            },
+            packets.lost,
+            packets.revolutions,
+            packets.rotation_hz,
+            match &packets.refused[..] {
+                "" => String::new(),
+                refused => format!("; refused: {refused}"),
+            },
+        );
+        say!(
+            "{}; clock {}, {:.3} s ahead",
+            packets.return_mode,
+            packets.clock,
+            packets.clock_ahead_s
         );
     }
     if let Some(own) = &report.own_vehicle {

@@ -40,6 +40,10 @@ mod objects;
 
 mod onlooker;
 
+mod packets;
+
+mod pcap;
+
 mod playback;
 
 mod process;
@@ -130,6 +134,16 @@ enum Completion {
     Done,
     /// Done, but parts of the input were damaged and were passed over.
     Damaged,
+}
+
+impl Completion {
+    /// Of two parts of the work together.
+    fn and(self, other: Self) -> Self {
+        match self {
+            Self::Done => other,
+            Self::Damaged => self,
+        }
+    }
 }
 
 /// Exit code of [`Completion::Damaged`].

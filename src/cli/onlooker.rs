@@ -6,7 +6,8 @@ use anyhow::Result;
 
 use crate::cloud::{CloudParameters, Intake, OwnVehicle, Scan};
 use crate::config::Configuration;
-use crate::daemon::session::{Datagram, Session};
+use crate::daemon::listener::Datagram;
+use crate::daemon::session::Session;
 use crate::ego::{Anchor, Placement, Pose};
 use crate::pipeline::OWN_IDS;
 use crate::time::Time;

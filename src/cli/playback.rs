@@ -10,8 +10,10 @@ use super::replay::LONGEST_PAUSE_S;
 use crate::config::Configuration;
 use crate::pipeline::{Outcome, Pipeline, RevolutionReport, Step};
 use crate::view::{Control, Feed, Player};
+use crate::wire::Message as _;
 use crate::wire::point_cloud::POINT_CLOUD_ID;
 use crate::wire::recording::Entry;
+use crate::wire::velodyne::captured::SensorPackets;
 
 /// When the point clouds of a recording are due, in seconds since its begin. Gaps are as long as they are waited for,
 /// and it never goes back, whatever the time stamps do.
@@ -29,7 +31,7 @@ impl Timeline {
         let (mut due_s, mut clouds) = (vec![], vec![]);
         let (mut now_s, mut last) = (0.0, None);
         for (number, entry) in entries.iter().enumerate() {
-            if entry.envelope.data_type == POINT_CLOUD_ID {
+            if [POINT_CLOUD_ID, SensorPackets::ID].contains(&entry.envelope.data_type) {
                 let time = entry.envelope.time();
                 let passed_s = last
                     .replace(time)

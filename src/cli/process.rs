@@ -71,7 +71,7 @@ struct Process<'a> {
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let mut configuration = files::configuration(arguments.config.as_deref())?;
     configuration.ego.use_poses &= !arguments.no_poses;
-    let (bytes, completion) = files::read_recording(&arguments.input)?;
+    let (bytes, completion) = files::Recorded::read(&arguments.input)?.with_packets();
     let outputs = [
         &arguments.output,
         &arguments.objects,
@@ -230,6 +230,10 @@ impl Process<'_> {
                 self.arguments.input.display(),
                 self.faults
             );
+        }
+        if counts.packets_lost > 0 {
+            let (path, lost) = (self.arguments.input.display(), counts.packets_lost);
+            tell!("kreisel: {path}: {lost} packets are missing");
         }
         for (count, what) in [
             (

@@ -9,7 +9,7 @@ use clap::Args;
 use super::files::Output;
 use super::{Completion, SessionArguments, block_on, stop_signal};
 use crate::config::Configuration;
-use crate::daemon::session::Datagram;
+use crate::daemon::listener::Datagram;
 use crate::wire::{Envelope, frame};
 
 #[derive(Debug, Args)]

@@ -1,5 +1,6 @@
 //! `kreisel replay`: a recording back onto the network.
 
+use std::net::Ipv4Addr;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -7,9 +8,11 @@ use anyhow::{Context as _, Result, bail};
 use clap::Args;
 use tokio::time::{Instant, sleep_until};
 
-use super::{Completion, SessionArguments, block_on, files, simulate, stop_signal};
+use super::capture::Capture;
+use super::packets::PacketSender;
+use super::{Completion, block_on, files, simulate, stop_signal};
 use crate::config::Configuration;
-use crate::daemon::session::Sender;
+use crate::daemon::session::{Sender, Session};
 use crate::simulate::scenario::Scenario;
 use crate::wire::Recording;
 use crate::wire::frame::MAX_DATAGRAM_LEN;
@@ -20,8 +23,15 @@ pub(super) struct Arguments {
     /// Recording or capture (pcap, pcapng) to play.
     #[arg(value_name = "FILE")]
     input: PathBuf,
-    #[command(flatten)]
-    session: SessionArguments,
+    /// The session: multicast group 225.0.0.CID, port 12175.
+    #[arg(long, value_name = "N", required_unless_present = "velodyne", value_parser = clap::value_parser!(u8).range(1..=254))]
+    cid: Option<u8>,
+    /// Address of the network interface to use [default: the routing table's choice].
+    #[arg(long, value_name = "IPV4")]
+    interface: Option<Ipv4Addr>,
+    /// Send the packets of a capture, as the sensor did, to this host and port [default: 127.0.0.1:2368].
+    #[arg(long, value_name = "HOST[:PORT]", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1", conflicts_with_all = ["cid", "interface"])]
+    velodyne: Option<String>,
     /// Times as fast as recorded.
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
     speed: f64,
@@ -48,18 +58,73 @@ fn speed(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
-    match &arguments.or_simulate {
-        Some(scenario) if !arguments.input.exists() => {
-            block_on(simulate(arguments, scenario))?;
-            Ok(Completion::Done)
+    let simulated = arguments.or_simulate.as_ref();
+    let simulated = simulated.filter(|_| !arguments.input.exists());
+    match (simulated, &arguments.velodyne, arguments.cid) {
+        (_, Some(target), _) => send_packets(arguments, target, simulated),
+        (simulated, None, Some(cid)) => {
+            let interface = arguments.interface;
+            let session = Session { cid, interface };
+            match simulated {
+                Some(scenario) => {
+                    block_on(simulate(arguments, session, scenario))?;
+                    Ok(Completion::Done)
+                }
+                None => replay(arguments, session),
+            }
         }
-        _ => replay(arguments),
+        (_, None, None) => bail!("neither a session nor a host to send to"),
     }
 }
 
+/// Packets to a host: those of a capture, or simulated ones.
+fn send_packets(
+    arguments: &Arguments,
+    target: &str,
+    simulated: Option<&Scenario>,
+) -> Result<Completion> {
+    let sender = PacketSender::to(target)?;
+    let path = &arguments.input;
+    if let Some(scenario) = simulated {
+        let name = scenario.name;
+        tracing::info!(
+            "{} does not exist: simulating \"{name}\" to {target}",
+            path.display()
+        );
+        block_on(async {
+            tokio::select! {
+                result = sender.simulate(scenario, SEED, arguments.speed) => result,
+                () = stop_signal() => Ok(()),
+            }
+        })?;
+        return Ok(Completion::Done);
+    }
+    let capture = Capture::read(path, &files::read(path)?)?;
+    capture.warn(path);
+    tracing::info!(
+        "playing {} packets to {target}",
+        capture.packets().iter().count()
+    );
+    block_on(async {
+        let play = async {
+            let mut due = Instant::now();
+            loop {
+                due = sender.play(capture.packets(), arguments.speed, due).await?;
+                if !arguments.repeat {
+                    return Ok(());
+                }
+            }
+        };
+        tokio::select! {
+            result = play => result,
+            () = stop_signal() => Ok(()),
+        }
+    })?;
+    Ok(capture.completion())
+}
+
 /// A simulated session at its own pace, without end.
-async fn simulate(arguments: &Arguments, scenario: &Scenario) -> Result<()> {
-    let session = arguments.session.session();
+async fn simulate(arguments: &Arguments, session: Session, scenario: &Scenario) -> Result<()> {
     let sender = session.sender(&Configuration::default().session)?;
     let (path, group) = (arguments.input.display(), session.group());
     tracing::info!(
@@ -72,8 +137,9 @@ async fn simulate(arguments: &Arguments, scenario: &Scenario) -> Result<()> {
     }
 }
 
-fn replay(arguments: &Arguments) -> Result<Completion> {
-    let (bytes, mut completion) = files::read_recording(&arguments.input)?;
+fn replay(arguments: &Arguments, session: Session) -> Result<Completion> {
+    let (bytes, mut completion) =
+        files::Recorded::read(&arguments.input)?.with_clouds(&arguments.input);
     let mut entries = vec![];
     for item in Recording::new(&bytes) {
         match item {
@@ -97,20 +163,19 @@ fn replay(arguments: &Arguments) -> Result<Completion> {
     }
     block_on(async {
         tokio::select! {
-            result = play(arguments, &entries) => result,
+            result = play(arguments, session, &entries) => result,
             () = stop_signal() => Ok(()),
         }
     })?;
     Ok(completion)
 }
 
-async fn play(arguments: &Arguments, entries: &[Entry<'_>]) -> Result<()> {
-    let session = arguments.session.session();
+async fn play(arguments: &Arguments, session: Session, entries: &[Entry<'_>]) -> Result<()> {
     let sender = session.sender(&Configuration::default().session)?;
     tracing::info!("playing {} envelopes to {}", entries.len(), session.group());
     let mut due = Instant::now();
     loop {
-        due = play_once(arguments, entries, &sender, due).await?;
+        due = play_once(arguments, session, entries, &sender, due).await?;
         if !arguments.repeat {
             return Ok(());
         }
@@ -120,6 +185,7 @@ async fn play(arguments: &Arguments, entries: &[Entry<'_>]) -> Result<()> {
 /// Plays the recording once, from `due` on; gives when it ended.
 async fn play_once(
     arguments: &Arguments,
+    session: Session,
     entries: &[Entry<'_>],
     sender: &Sender,
     mut due: Instant,
@@ -133,7 +199,7 @@ async fn play_once(
         due += Duration::from_secs_f64(passed_s.clamp(0.0, LONGEST_PAUSE_S) / arguments.speed);
         sleep_until(due).await;
         let sent = sender.send(entry.frame);
-        sent.with_context(|| format!("cannot send to {}", arguments.session.session().group()))?;
+        sent.with_context(|| format!("cannot send to {}", session.group()))?;
         bar.inc(1);
     }
     bar.finish_and_clear();

@@ -1,19 +1,34 @@
 //! `kreisel run`: the daemon.
 
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
 use anyhow::{Context as _, Result};
 use clap::Args;
 
-use super::{Completion, SessionArguments, block_on, files, stop_signal};
+use super::{Completion, block_on, files, stop_signal};
+use crate::daemon::sensor::SensorPort;
+use crate::daemon::session::Session;
 use crate::daemon::{self, Options};
 use crate::view::{self, DEFAULT_ADDRESS, Feed};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    #[command(flatten)]
-    session: SessionArguments,
+    /// The session: multicast group 225.0.0.CID, port 12175.
+    #[arg(long, value_name = "N", required_unless_present = "velodyne", value_parser = clap::value_parser!(u8).range(1..=254))]
+    cid: Option<u8>,
+    /// Address of the network interface to use [default: the routing table's choice].
+    #[arg(long, value_name = "IPV4")]
+    interface: Option<Ipv4Addr>,
+    /// Take the packets of a VLP-16 itself, from this UDP port [default: 2368].
+    #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = DEFAULT_PORT, value_parser = clap::value_parser!(u16).range(1..))]
+    velodyne: Option<u16>,
+    /// Address of that VLP-16 [default: the first one that is heard].
+    #[arg(long, value_name = "IPV4", requires = "velodyne")]
+    sensor: Option<Ipv4Addr>,
+    /// Send the point clouds that a device service would make of its packets into the session.
+    #[arg(long, requires = "velodyne", requires = "cid")]
+    publish_cloud: bool,
     /// senderStamp of what is sent, to tell several instances apart.
     #[arg(long, value_name = "STAMP", default_value_t = 0)]
     id: u32,
@@ -25,9 +40,19 @@ pub(super) struct Arguments {
     view: Option<SocketAddr>,
 }
 
+/// The port of data packets as the command line writes it.
+const DEFAULT_PORT: &str = "2368";
+
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
+    let interface = arguments.interface;
     let options = Options {
-        session: arguments.session.session(),
+        session: arguments.cid.map(|cid| Session { cid, interface }),
+        sensor: arguments.velodyne.map(|port| SensorPort {
+            port,
+            interface,
+            address: arguments.sensor,
+        }),
+        publish_cloud: arguments.publish_cloud,
         sender_stamp: arguments.id,
         configuration: files::configuration(arguments.config.as_deref())?,
         view: arguments.view.map(serve_view).transpose()?,

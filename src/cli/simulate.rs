@@ -9,10 +9,11 @@ use tokio::time::{Instant, sleep_until};
 
 use super::files::{Output, progress};
 use super::labels::LabelWriter;
+use super::pcap::PcapWriter;
 use super::{Completion, map, objects};
 use crate::daemon::session::Sender;
-use crate::simulate::Simulation;
 use crate::simulate::scenario::{self, Scenario};
+use crate::simulate::{Simulation, Truth};
 use crate::wire::Recording;
 
 #[derive(Debug, Args)]
@@ -29,8 +30,8 @@ pub(super) struct Arguments {
     /// How long, in seconds.
     #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = duration)]
     duration: f64,
-    /// Recording to write.
-    #[arg(long, value_name = "FILE.rec", required_unless_present = "list")]
+    /// Recording to write; a capture of the sensor's packets if its name ends in .pcap.
+    #[arg(long, value_name = "FILE", required_unless_present = "list")]
     output: Option<PathBuf>,
     /// Truth to write, one line of JSON a revolution.
     #[arg(long, value_name = "FILE.jsonl")]
@@ -102,7 +103,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let (Some(scenario), Some(path)) = (&arguments.scenario, &arguments.output) else {
         return Ok(Completion::Done);
     };
-    let mut output = Output::create(path)?;
+    let in_packets = path
+        .extension()
+        .is_some_and(|extension| extension == "pcap");
+    let mut sink = match in_packets {
+        true => Sink::Capture(PcapWriter::create(path)?),
+        false => Sink::Recording(Output::create(path)?, vec![]),
+    };
     let mut truth = Output::create_if(arguments.truth.as_deref())?;
     let mut labels = arguments
         .labels
@@ -111,15 +118,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
         .transpose()?;
     let revolutions = (arguments.duration * ROTATION_HZ).round().max(1.0) as usize;
     let bar = progress(revolutions, "revolutions");
-    let mut simulation = Simulation::new(*scenario, arguments.seed);
+    let mut simulation = match in_packets {
+        true => Simulation::in_packets(*scenario, arguments.seed),
+        false => Simulation::new(*scenario, arguments.seed),
+    };
     if arguments.grid.is_some() {
         simulation.survey();
     }
-    let mut frame = vec![];
     for revolution in 0..revolutions {
-        frame.clear();
-        let was = simulation.revolve(&mut frame);
-        output.put(&frame)?;
+        let was = sink.revolve(&mut simulation)?;
         if let Some(truth) = &mut truth {
             truth.put(&objects::truth_line(&was)?)?;
         }
@@ -129,11 +136,57 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
         bar.inc(1);
     }
     bar.finish_and_clear();
-    output.finish()?;
+    sink.finish(&mut simulation)?;
     truth.map_or(Ok(()), Output::finish)?;
     labels.map_or(Ok(()), LabelWriter::finish)?;
     if let (Some(path), Some(map)) = (&arguments.grid, simulation.map()) {
         map::write_truth(path, &map)?;
     }
     Ok(Completion::Done)
+}
+
+/// Where revolutions go.
+enum Sink {
+    /// As point clouds and poses, with room for those of a revolution.
+    Recording(Output, Vec<u8>),
+    /// As the sensor's packets.
+    Capture(PcapWriter),
+}
+
+impl Sink {
+    fn revolve(&mut self, simulation: &mut Simulation) -> Result<Truth> {
+        match self {
+            Self::Recording(output, frames) => {
+                frames.clear();
+                let truth = simulation.revolve(frames);
+                output.put(frames)?;
+                Ok(truth)
+            }
+            Self::Capture(writer) => {
+                let mut written = Ok(());
+                let truth = simulation.revolve_in_packets(|packet| {
+                    if written.is_ok() {
+                        written = writer.put(packet);
+                    }
+                });
+                written.map(|()| truth)
+            }
+        }
+    }
+
+    fn finish(self, simulation: &mut Simulation) -> Result<()> {
+        match self {
+            Self::Recording(output, _) => output.finish(),
+            Self::Capture(mut writer) => {
+                let mut written = Ok(());
+                simulation.close_packets(|packet| {
+                    if written.is_ok() {
+                        written = writer.put(packet);
+                    }
+                });
+                written?;
+                writer.finish()
+            }
+        }
+    }
 }

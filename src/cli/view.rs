@@ -66,7 +66,7 @@ fn serve(address: SocketAddr) -> Result<(Feed, mpsc::Receiver<Control>)> {
 
 fn play(arguments: &Arguments, path: &Path) -> Result<Completion> {
     let configuration = files::configuration(arguments.config.as_deref())?;
-    let (bytes, mut completion) = files::read_recording(path)?;
+    let (bytes, mut completion) = files::Recorded::read(path)?.with_packets();
     let mut entries = vec![];
     for item in Recording::new(&bytes) {
         match item {

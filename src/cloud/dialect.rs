@@ -6,6 +6,8 @@ use crate::wire::point_cloud::{ByteOrder, CompactPointCloud, DistanceEncoding, S
 /// How a byte order is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ByteOrderSource {
+    /// Its source knows one only.
+    Defined,
     /// The configuration says it.
     Configured,
     /// The data shows it.
@@ -18,6 +20,7 @@ impl ByteOrderSource {
     /// How logs and Status name it.
     pub const fn name(self) -> &'static str {
         match self {
+            Self::Defined => "defined",
             Self::Configured => "configured",
             Self::Detected => "detected",
             Self::Assumed => "assumed",

@@ -2,20 +2,33 @@
 
 use super::dialect::{DialectDetector, shown_order};
 use super::sensor::{self, Sensor};
-use super::{CloudParameters, Dialect, MAX_COLUMNS, Refusal};
+use super::{CloudParameters, Dialect, MAX_COLUMNS, Refusal, Turn};
 use crate::time::{Span, Time};
 use crate::wire::Envelope;
 use crate::wire::point_cloud::{ByteOrder, CompactPointCloud, LAYOUT_RPLIDAR, Schema};
 
-/// A message that was taken, with all that the next steps need.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Where a revolution's distances are.
+#[derive(Debug, Clone, Copy)]
+pub enum Source<'a> {
+    /// In a message, at equal steps of azimuth.
+    Cloud(CompactPointCloud<'a>),
+    /// In firings, each with an azimuth of its own.
+    Turn(&'a Turn),
+}
+
+/// A revolution that was taken, with all that the next steps need.
+#[derive(Debug, Clone, Copy)]
 pub struct Revolution<'a> {
-    /// The message.
-    pub cloud: CompactPointCloud<'a>,
+    /// Where its distances are.
+    pub source: Source<'a>,
     /// Its sensor.
     pub sensor: &'static Sensor,
     /// How its distances are written.
     pub dialect: Dialect,
+    /// How many columns there are.
+    pub columns: usize,
+    /// From one column to the next, seconds.
+    pub column_period_s: f64,
     /// Azimuth of the first column, degrees.
     pub start_deg: f64,
     /// From one column to the next, degrees; negative when azimuths fall.
@@ -79,9 +92,11 @@ impl Intake {
         self.home.get_or_insert(envelope.sender_stamp);
         self.listened.get_or_insert(envelope.sender_stamp);
         Ok(Revolution {
-            cloud,
+            source: Source::Cloud(cloud),
             sensor,
             dialect,
+            columns: cloud.columns(),
+            column_period_s: sensor.column_period_s,
             start_deg,
             step_deg,
             time,

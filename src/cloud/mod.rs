@@ -3,13 +3,15 @@
 //! `dialect` finds what the message does not say (byte order) and what it says in two ways
 //! (intensity, unit). `intake` decides whether the message is one whole revolution that the
 //! array can hold, `refusal` says why not. `scan` is the array, `passes` fills it, `own_vehicle` masks part of it.
-//! `sensor` has the elevation tables.
+//! `sensor` has the elevation tables. `packets` puts revolutions together from what a sensor itself sends.
 
 mod dialect;
 
 mod intake;
 
 mod own_vehicle;
+
+pub mod packets;
 
 mod passes;
 
@@ -23,8 +25,9 @@ pub(crate) use scan::tests;
 pub mod sensor;
 
 pub use dialect::{ByteOrderSource, Dialect, shown_order};
-pub use intake::{Intake, Revolution};
+pub use intake::{Intake, Revolution, Source};
 pub use own_vehicle::{Extent, OwnVehicle};
+pub use packets::{ClockState, PacketIntake, PacketRefusal, Turn};
 pub use refusal::Refusal;
 pub use scan::{Azimuths, CAPACITY, MAX_COLUMNS, MAX_LAYERS, Scan};
 
@@ -53,6 +56,16 @@ choices! {
         TwoMillimetres = "2mm",
         /// 0.02 m.
         TwoCentimetres = "2cm",
+    }
+}
+
+choices! {
+    /// Whose time the revolutions of a sensor's own packets have.
+    pub enum PacketTime {
+        /// The sensor's, where a GPS receiver keeps it; else that of the arrival.
+        Sensor = "sensor",
+        /// That of the arrival.
+        Arrival = "arrival",
     }
 }
 
@@ -94,5 +107,10 @@ parameters! {
         /// Part of the circle that a message must cover to be a revolution; of a sensor that
         /// sees less than the circle, the same share of its field.
         least_span_deg: f64 = 350.0, in 1.0..=359.0, "degrees";
+        /// Of a sensor's own packets: whose time its revolutions have. sensor takes the sensor's where a GPS receiver
+        /// keeps it and it is within 10 s of this computer's; poses must then have the same time.
+        packet_time: PacketTime = PacketTime::Sensor, "";
+        /// Of a sensor's own packets: share of a revolution that may be lost. What is lost counts as not seen.
+        most_lost_share: f64 = 0.1, in 0.0..=0.9, "";
     }
 }

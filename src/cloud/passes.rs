@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 
 use super::Dialect;
-use super::scan::{MAX_LAYERS, NO_LAYER};
+use super::scan::{MAX_LAYERS, UNSEEN};
 use crate::float::greatest;
 
 /// Reads the ranges of columns of so many layers. What is not within the two that are kept is
@@ -32,7 +32,7 @@ pub(super) fn read_ranges(
             let kept_m = if is_kept { range_m } else { -range_m };
             ranges_m[layer] = if units == 0 { 0.0 } else { kept_m };
         }
-        ranges_m[layers..].fill(NO_LAYER);
+        ranges_m[layers..].fill(UNSEEN);
     }
 }
 
@@ -69,5 +69,21 @@ pub(super) fn place(
         x_m[column] = horizontal_m.map(|metres| metres * sine);
         y_m[column] = horizontal_m.map(|metres| metres * cosine);
         z_m[column] = vertical_m;
+    }
+}
+
+/// Turns the points of every layer clockwise by an angle of its own; given are its sine and cosine.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+pub(super) fn turn(
+    turns: &[[f32; 2]; MAX_LAYERS],
+    x_m: &mut [[f32; MAX_LAYERS]],
+    y_m: &mut [[f32; MAX_LAYERS]],
+) {
+    for (x_m, y_m) in x_m.iter_mut().zip(y_m) {
+        for layer in 0..MAX_LAYERS {
+            let ([sine, cosine], x, y) = (turns[layer], x_m[layer], y_m[layer]);
+            x_m[layer] = x * cosine + y * sine;
+            y_m[layer] = y * cosine - x * sine;
+        }
     }
 }

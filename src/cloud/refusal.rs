@@ -89,6 +89,14 @@ pub enum Refusal {
         /// Step in the revolutions before.
         usual_deg: f64,
     },
+    /// More packets were lost than may be.
+    #[error("{missing} of {columns} columns are missing: packets were lost")]
+    LostPackets {
+        /// Columns that are missing.
+        missing: usize,
+        /// Columns with them.
+        columns: usize,
+    },
     /// Older than the revolution before, or the same again.
     #[error("{late_s:.3} s older than the revolution before")]
     OutOfOrder {
@@ -114,6 +122,7 @@ impl Refusal {
             Self::FirstAzimuth { .. } => "first_azimuth",
             Self::PartialRevolution { .. } => "partial_revolution",
             Self::UnevenStep { .. } => "uneven_step",
+            Self::LostPackets { .. } => "lost_packets",
             Self::OutOfOrder { .. } => "out_of_order",
         }
     }

@@ -2,7 +2,7 @@
 
 use super::passes::{self, Coordinates};
 use super::sensor::{self, Sensor};
-use super::{CloudParameters, OwnVehicle, Revolution};
+use super::{CloudParameters, OwnVehicle, Revolution, Source, Turn};
 use crate::ego::wrapped_rad;
 use crate::float::LANES;
 use crate::time::Time;
@@ -19,8 +19,9 @@ const _: () = assert!(MAX_LAYERS == 2 * LANES);
 /// Points that the array holds.
 pub const CAPACITY: usize = MAX_COLUMNS * MAX_LAYERS;
 
-/// The range of points in layers that the sensor does not have: masked, and far from everything.
-pub(super) const NO_LAYER: f32 = f32::MIN;
+/// The range of points in layers that the sensor does not have, and in columns of which nothing was heard: masked, and
+/// far from everything.
+pub(super) const UNSEEN: f32 = f32::MIN;
 
 /// Tangent and cosine of the elevation of layers that a sensor does not have: they meet nothing.
 const UPRIGHT: (f64, f64) = (1e6, 1e-6);
@@ -34,11 +35,17 @@ pub struct Scan {
     time: Time,
     start_rad: f64,
     step_rad: f64,
+    column_period_s: f64,
     /// Tangent and cosine of every layer's elevation.
     slopes: [(f64, f64); MAX_LAYERS],
-    /// Sine and cosine of every column's azimuth.
+    /// Every column's azimuth, and its sine and cosine.
+    azimuths_rad: Box<[f64]>,
     directions: Box<[[f32; 2]]>,
     range_m: Box<[f32]>,
+    /// Ranges of the farthest returns, where pulses have two.
+    farthest_m: Vec<f32>,
+    /// Where the source says it.
+    reflectivity: Vec<u8>,
     x_m: Box<[f32]>,
     y_m: Box<[f32]>,
     z_m: Box<[f32]>,
@@ -102,9 +109,13 @@ impl Default for Scan {
             time: Time::ZERO,
             start_rad: 0.0,
             step_rad: 0.0,
+            column_period_s: sensor::VLP16.column_period_s,
             slopes: [(0.0, 1.0); MAX_LAYERS],
+            azimuths_rad: vec![0.0; MAX_COLUMNS].into_boxed_slice(),
             directions: vec![[0.0, 1.0]; MAX_COLUMNS].into_boxed_slice(),
             range_m: zeros(),
+            farthest_m: vec![],
+            reflectivity: vec![],
             x_m: zeros(),
             y_m: zeros(),
             z_m: zeros(),
@@ -120,46 +131,89 @@ impl Scan {
         own: &OwnVehicle,
         parameters: &CloudParameters,
     ) {
-        self.columns = revolution.cloud.columns();
+        self.columns = revolution.columns;
         self.sensor = revolution.sensor;
         self.time = revolution.time;
         self.start_rad = revolution.start_deg.to_radians();
         self.step_rad = revolution.step_deg.to_radians();
-        self.read_ranges(revolution, parameters);
-        self.place_points();
+        self.column_period_s = revolution.column_period_s;
+        self.farthest_m.clear();
+        self.reflectivity.clear();
+        let kept_m = [parameters.minimum_range_m, parameters.maximum_range_m];
+        let kept_m = kept_m.map(|metres| metres as f32);
+        let laser_turns_deg = match revolution.source {
+            Source::Cloud(cloud) => {
+                passes::read_ranges(
+                    cloud.distances,
+                    usize::from(cloud.layers),
+                    revolution.dialect,
+                    kept_m,
+                    self.range_m.as_chunks_mut().0,
+                );
+                self.look_evenly();
+                None
+            }
+            Source::Turn(turn) => {
+                self.read_turn(turn, revolution.dialect.unit_m, kept_m);
+                Some(turn.laser_turns_deg())
+            }
+        };
+        self.place_points(laser_turns_deg);
         self.mask_vehicle(own, parameters);
     }
 
-    /// Distances to metres; what is out of range is masked.
-    fn read_ranges(&mut self, revolution: &Revolution<'_>, parameters: &CloudParameters) {
-        let kept_m = [parameters.minimum_range_m, parameters.maximum_range_m];
-        passes::read_ranges(
-            revolution.cloud.distances,
-            usize::from(revolution.cloud.layers),
-            revolution.dialect,
-            kept_m.map(|metres| metres as f32),
-            self.range_m.as_chunks_mut().0,
-        );
+    /// Firings to metres; what is out of range is masked, and so is what was not seen.
+    fn read_turn(&mut self, turn: &Turn, unit_m: f32, [low_m, high_m]: [f32; 2]) {
+        let range_m = |units: u16| {
+            let range_m = f32::from(units) * unit_m;
+            let is_kept = (low_m..=high_m).contains(&range_m);
+            if is_kept || units == 0 {
+                range_m
+            } else {
+                -range_m
+            }
+        };
+        let ranges_m = self.range_m.as_chunks_mut::<MAX_LAYERS>().0;
+        for (column, (azimuth_deg, firing)) in turn.columns().enumerate() {
+            let azimuth_rad = azimuth_deg.to_radians();
+            let (sine, cosine) = libm::sincos(azimuth_rad);
+            self.azimuths_rad[column] = azimuth_rad;
+            self.directions[column] = [sine as f32, cosine as f32];
+            let of = |distances: [u16; MAX_LAYERS]| match firing.is_seen {
+                true => distances.map(range_m),
+                false => [UNSEEN; MAX_LAYERS],
+            };
+            ranges_m[column] = of(firing.nearest);
+            self.reflectivity.extend_from_slice(&firing.reflectivity);
+            if turn.is_dual() {
+                self.farthest_m.extend_from_slice(&of(firing.farthest));
+            }
+        }
     }
 
-    /// Polar to Cartesian. Sine and cosine of the azimuth advance by rotation, in double
-    /// precision: after 2,000 steps they are right to 1e-12.
-    fn place_points(&mut self) {
+    /// Azimuths at equal steps. Sine and cosine advance by rotation, in double precision: after 2,000 steps they are
+    /// right to 1e-12.
+    fn look_evenly(&mut self) {
+        let (mut sine, mut cosine) = libm::sincos(self.start_rad);
+        let (step_sine, step_cosine) = libm::sincos(self.step_rad);
+        for column in 0..self.columns {
+            self.azimuths_rad[column] = self.start_rad + column as f64 * self.step_rad;
+            self.directions[column] = [sine as f32, cosine as f32];
+            (sine, cosine) = (
+                sine * step_cosine + cosine * step_sine,
+                cosine * step_cosine - sine * step_sine,
+            );
+        }
+    }
+
+    /// Polar to Cartesian; the lasers of a column look so much farther than the first one, if that is known.
+    fn place_points(&mut self, laser_turns_deg: Option<[f64; MAX_LAYERS]>) {
         let mut elevations = [[0.0f32; MAX_LAYERS]; 2];
         self.slopes = [UPRIGHT; MAX_LAYERS];
         for (layer, degrees) in self.sensor.elevation_deg.iter().enumerate() {
             let (sine, cosine) = libm::sincos(degrees.to_radians());
             (elevations[0][layer], elevations[1][layer]) = (sine as f32, cosine as f32);
             self.slopes[layer] = (sine / cosine, cosine);
-        }
-        let (mut sine, mut cosine) = libm::sincos(self.start_rad);
-        let (step_sine, step_cosine) = libm::sincos(self.step_rad);
-        for direction in &mut self.directions[..self.columns] {
-            *direction = [sine as f32, cosine as f32];
-            (sine, cosine) = (
-                sine * step_cosine + cosine * step_sine,
-                cosine * step_cosine - sine * step_sine,
-            );
         }
         let coordinates = Coordinates {
             x_m: self.x_m.as_chunks_mut().0,
@@ -168,6 +222,15 @@ impl Scan {
         };
         let ranges_m = &self.range_m.as_chunks().0[..self.columns];
         passes::place(ranges_m, &elevations, &self.directions, coordinates);
+        if let Some(laser_turns_deg) = laser_turns_deg {
+            let turns = laser_turns_deg.map(|degrees| {
+                let (sine, cosine) = libm::sincos(degrees.to_radians());
+                [sine as f32, cosine as f32]
+            });
+            let points = 0..self.len();
+            let (x_m, y_m) = (&mut self.x_m[points.clone()], &mut self.y_m[points]);
+            passes::turn(&turns, x_m.as_chunks_mut().0, y_m.as_chunks_mut().0);
+        }
     }
 
     /// Masks what lies in the box around the own vehicle, or where it was learned to be if no box is given.
@@ -211,7 +274,7 @@ impl Scan {
 
     /// Azimuth of a column in radians, clockwise from y.
     pub fn azimuth_rad(&self, column: usize) -> f64 {
-        self.start_rad + column as f64 * self.step_rad
+        self.azimuths_rad[column]
     }
 
     /// Sine and cosine of a column's azimuth: its direction to the right and forward.
@@ -219,7 +282,7 @@ impl Scan {
         self.directions[column]
     }
 
-    /// From one column to the next in radians; negative when azimuths fall.
+    /// From one column to the next in radians on average; negative when azimuths fall.
     pub fn step_rad(&self) -> f64 {
         self.step_rad
     }
@@ -282,14 +345,19 @@ impl Scan {
         self.slopes[layer]
     }
 
+    /// Revolutions a second, from the step between columns.
+    pub fn rotation_hz(&self) -> f64 {
+        libm::fabs(self.step_rad) / (TAU * self.column_period_s)
+    }
+
     /// Seconds from the first column to the end of the sweep.
     pub fn duration_s(&self) -> f64 {
-        self.columns as f64 * self.sensor.column_period_s
+        self.columns as f64 * self.column_period_s
     }
 
     /// How long before the end of the sweep a column was measured, in seconds.
     pub fn age_s(&self, column: usize) -> f64 {
-        (self.columns - 1 - column) as f64 * self.sensor.column_period_s
+        (self.columns - 1 - column) as f64 * self.column_period_s
     }
 
     /// Points of this revolution, with and without a return.
@@ -336,6 +404,27 @@ impl Scan {
     /// vehicle.
     pub fn range_m(&self) -> &[f32] {
         &self.range_m[..self.len()]
+    }
+
+    /// Whether pulses can have two returns.
+    pub fn has_two_returns(&self) -> bool {
+        !self.farthest_m.is_empty()
+    }
+
+    /// Where a pulse can have two returns, the ranges of the farther one, and else the same as [`Self::range_m`]: so far a ray
+    /// is known to have gone.
+    pub fn reached_m(&self) -> &[f32] {
+        if self.farthest_m.is_empty() {
+            self.range_m()
+        } else {
+            &self.farthest_m
+        }
+    }
+
+    /// Reflectivity of every return, up to 100 of diffuse surfaces and above of retroreflectors; empty where the
+    /// source does not say it.
+    pub fn reflectivity(&self) -> &[u8] {
+        &self.reflectivity
     }
 
     /// To the right, metres.
@@ -418,11 +507,13 @@ pub(crate) mod tests {
     fn revolution(distances: &[u8]) -> Revolution<'_> {
         let columns = distances.len() / 32;
         Revolution {
-            cloud: CompactPointCloud {
+            source: Source::Cloud(CompactPointCloud {
                 layers: 16,
                 distances,
                 ..CompactPointCloud::default()
-            },
+            }),
+            columns,
+            column_period_s: sensor::VLP16.column_period_s,
             sensor: &sensor::VLP16,
             dialect: Dialect {
                 byte_order: ByteOrder::Big,

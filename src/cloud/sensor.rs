@@ -33,6 +33,43 @@ pub static VLP16: Sensor = Sensor {
     field_deg: 360.0,
 };
 
+/// Velodyne Puck Hi-Res: the same within 10 degrees up and down (user manual, table 9-1).
+pub static PUCK_HI_RES: Sensor = Sensor {
+    name: "Puck Hi-Res",
+    elevation_deg: &[
+        -10.0, -8.67, -7.33, -6.0, -4.67, -3.33, -2.0, -0.67, 0.67, 2.0, 3.33, 4.67, 6.0, 7.33,
+        8.67, 10.0,
+    ],
+    column_period_s: VLP16.column_period_s,
+    field_deg: 360.0,
+};
+
+/// The sensor whose packets bear a factory byte, if the array can hold it (user manual, table 9-3). A Puck Lite says that
+/// it is a VLP-16.
+pub fn of_product(product: u8) -> Option<&'static Sensor> {
+    match product {
+        VLP16_PRODUCT => Some(&VLP16),
+        0x24 => Some(&PUCK_HI_RES),
+        _ => None,
+    }
+}
+
+/// The factory byte of a VLP-16.
+pub const VLP16_PRODUCT: u8 = 0x22;
+
+/// What the manufacturer calls a sensor with a factory byte.
+pub const fn product_name(product: u8) -> &'static str {
+    match product {
+        0x21 => "HDL-32E",
+        VLP16_PRODUCT => "VLP-16",
+        0x24 => "Puck Hi-Res",
+        0x28 => "VLP-32C",
+        0x31 => "Velarray",
+        0x63 | 0xa1 => "VLS-128",
+        _ => "unknown sensor",
+    }
+}
+
 /// Ibeo LUX 8L: two times four layers 0.8 degrees apart, 110 degrees in steps of 0.25 at 25 Hz
 /// (Chen 2021, table 2.3).
 pub static IBEO_LUX_8L: Sensor = Sensor {

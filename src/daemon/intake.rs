@@ -3,8 +3,8 @@
 use tracing::trace;
 
 use super::fault_log::FaultLog;
+use super::listener::{Arrival, Datagram};
 use super::queue::Queue;
-use super::session::{Arrival, Datagram};
 use crate::pipeline::Pipeline;
 use crate::tally::Tally;
 use crate::wire::Envelope;
@@ -22,9 +22,18 @@ pub(super) struct Intake {
     pub(super) kernel_dropped: u64,
     pub(super) faults: Tally,
     log: FaultLog,
+    /// Whether revolutions come from a sensor's own packets, and point clouds are none of ours.
+    has_sensor: bool,
 }
 
 impl Intake {
+    pub(super) fn new(has_sensor: bool) -> Self {
+        Self {
+            has_sensor,
+            ..Self::default()
+        }
+    }
+
     /// Counts a datagram and queues it if it means anything to the pipeline.
     pub(super) fn hear(&mut self, datagram: &mut Datagram, arrival: &Arrival, queue: &mut Queue) {
         self.datagrams += 1;
@@ -54,6 +63,13 @@ impl Intake {
         }
         if !Pipeline::concerns(envelope.data_type) {
             trace!("message {} from {source} passed over", envelope.data_type);
+        } else if envelope.data_type == POINT_CLOUD_ID && self.has_sensor {
+            self.faults.count("cloud_beside_sensor");
+            self.log.note("cloud_beside_sensor", || {
+                format!(
+                    "point clouds from {source} are passed over: the sensor's own packets are used"
+                )
+            });
         } else if envelope.data_type == POINT_CLOUD_ID {
             queue.push_revolution(datagram, arrival.time);
         } else if datagram.bytes().len() > LONGEST_POSE {

@@ -1,6 +1,6 @@
 //! The shell around the pipeline: a session on the network, a queue, a clock, one thread.
 //!
-//! `session` has the sockets, `intake` sorts what comes, `queue` stands between it and
+//! `session` has the sockets of a session, `sensor` those of a sensor, both on a `listener`; `intake` sorts what comes, `queue` stands between it and
 //! `worker`, which owns the pipeline. `health` answers the container's health check, `latency`
 //! and `fault_log` keep figures and logs small. Everything is bounded.
 //!
@@ -17,14 +17,18 @@ mod intake;
 
 mod latency;
 
+pub mod listener;
+
 mod queue;
+
+pub mod sensor;
 
 pub mod session;
 
 mod worker;
 
 use std::convert::Infallible;
-use std::future::{Future, ready};
+use std::future::{Future, pending, ready};
 use std::time::Duration;
 
 use tokio::time::{MissedTickBehavior, interval};
@@ -36,21 +40,38 @@ use crate::time::Time;
 use crate::view::Feed;
 use health::Vitals;
 use intake::Intake;
+use listener::Datagram;
 use queue::Queue;
-use session::{Datagram, Receiver, Session, SessionError};
-use worker::Worker;
+use sensor::{SensorError, SensorPort, SensorPorts};
+use session::{Receiver, Session, SessionError};
+use worker::{Output, Worker};
 
 /// What a user says on the command line about a daemon.
 #[derive(Debug)]
 pub struct Options {
-    /// Session.
-    pub session: Session,
+    /// Session, if there is one.
+    pub session: Option<Session>,
+    /// Where a sensor's own packets come in, if they do.
+    pub sensor: Option<SensorPort>,
+    /// Whether point clouds are made of them for the session.
+    pub publish_cloud: bool,
     /// senderStamp of what is sent.
     pub sender_stamp: u32,
     /// Everything else.
     pub configuration: Configuration,
     /// Where pictures go, if anybody may look.
     pub view: Option<Feed>,
+}
+
+/// Why a daemon cannot run.
+#[derive(Debug, thiserror::Error)]
+pub enum DaemonError {
+    /// For its session.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// For its sensor.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
 }
 
 /// How often Status is sent.
@@ -65,15 +86,63 @@ const MOST_AT_ONCE: usize = 256;
 /// Runs the daemon until `stop` is ready.
 ///
 /// # Errors
-/// [`SessionError`] when the session cannot be joined or is lost.
-pub async fn run(options: Options, stop: impl Future<Output = ()>) -> Result<(), SessionError> {
+/// [`DaemonError`] when the session cannot be joined or the sensor not be heard, or when they are lost.
+pub async fn run(options: Options, stop: impl Future<Output = ()>) -> Result<(), DaemonError> {
     let parameters = &options.configuration.session;
-    let (mut receiver, sender) = options.session.join(parameters)?;
+    let joined = options
+        .session
+        .map(|session| session.join(parameters))
+        .transpose()?;
+    let (receiver, sender) = joined.unzip();
+    if let Some(receiver) = &receiver {
+        tell_joined(receiver, parameters.ttl);
+    }
+    let buffer_mb = parameters.receive_buffer_mb;
+    let sensor = options
+        .sensor
+        .map(|sensor| sensor.open(buffer_mb))
+        .transpose()?;
+    if let Some(at) = options.sensor {
+        info!("listening for packets of a VLP-16 on UDP port {}", at.port);
+    }
+    let buffer_bytes = receiver.as_ref().map(Receiver::buffer_bytes);
+    let buffer_bytes = buffer_bytes.or(sensor.as_ref().map(SensorPorts::buffer_bytes));
+    let vitals = Vitals::default();
+    let output = Output {
+        sender,
+        sender_stamp: options.sender_stamp,
+        view: options.view,
+    };
+    let worker = Worker::new(
+        Pipeline::new(&options.configuration, options.sender_stamp),
+        output,
+        options.publish_cloud,
+        buffer_bytes.unwrap_or_default(),
+        &vitals,
+    );
+    let mut service = Service {
+        receiver,
+        sensor,
+        intake: Intake::new(options.sensor.is_some()),
+        queue: Queue::new(parameters.queue_revolutions),
+        worker,
+    };
+    let cid = options.session.map_or(0, |session| session.cid);
+    let result = tokio::select! {
+        result = service.serve() => result.map(|never| match never {}),
+        () = health::serve(cid, &vitals) => Ok(()),
+        () = stop => Ok(()),
+    };
+    service.worker.log_latency();
+    info!("stopped");
+    result
+}
+
+fn tell_joined(receiver: &Receiver, ttl: usize) {
     info!(
-        "joined {} on {}, sending with TTL {}; receive buffer {} kB ({:.1} s of a VLP-16 at 10 Hz)",
+        "joined {} on {}, sending with TTL {ttl}; receive buffer {} kB ({:.1} s of a VLP-16 at 10 Hz)",
         receiver.group(),
         receiver.interface(),
-        parameters.ttl,
         receiver.buffer_bytes() / 1000,
         receiver.buffer_seconds(),
     );
@@ -83,59 +152,103 @@ pub async fn run(options: Options, stop: impl Future<Output = ()>) -> Result<(),
              CAP_NET_ADMIN, or revolutions are lost when this computer is busy"
         );
     }
-    let vitals = Vitals::default();
-    let mut worker = Worker::new(
-        Pipeline::new(&options.configuration, options.sender_stamp),
-        sender,
-        options.sender_stamp,
-        receiver.buffer_bytes(),
-        &vitals,
-        options.view,
-    );
-    let queue = Queue::new(parameters.queue_revolutions);
-    let result = tokio::select! {
-        result = serve(&mut receiver, queue, &mut worker) => result.map(|never| match never {}),
-        () = health::serve(options.session.cid, &vitals) => Ok(()),
-        () = stop => Ok(()),
-    };
-    worker.log_latency();
-    info!("stopped");
-    result
 }
 
-/// Takes in what comes and answers it, and sends a Status now and then.
-async fn serve(
-    receiver: &mut Receiver,
-    mut queue: Queue,
-    worker: &mut Worker<'_>,
-) -> Result<Infallible, SessionError> {
-    let mut intake = Intake::default();
-    let mut datagram = Datagram::default();
-    let mut ticks = interval(STATUS_PERIOD);
-    ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
-    ticks.tick().await;
-    loop {
-        tokio::select! {
-            biased;
-            _ = ticks.tick() => worker.send_status(&intake, &queue),
-            () = ready(()), if !queue.is_empty() => {}
-            arrival = receiver.receive(&mut datagram) => {
-                intake.hear(&mut datagram, &arrival?, &mut queue);
+/// All that the one thread works with.
+struct Service<'a> {
+    receiver: Option<Receiver>,
+    sensor: Option<SensorPorts>,
+    intake: Intake,
+    queue: Queue,
+    worker: Worker<'a>,
+}
+
+impl Service<'_> {
+    /// Takes in what comes and answers it, and sends a Status now and then.
+    async fn serve(&mut self) -> Result<Infallible, DaemonError> {
+        let mut datagram = Datagram::default();
+        let mut packet = Datagram::default();
+        let mut ticks = interval(STATUS_PERIOD);
+        ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
+        ticks.tick().await;
+        loop {
+            let mut is_due = false;
+            let from_session = async {
+                match &mut self.receiver {
+                    Some(receiver) => receiver.receive(&mut datagram).await,
+                    None => pending().await,
+                }
+            };
+            tokio::select! {
+                biased;
+                _ = ticks.tick() => is_due = true,
+                () = ready(()), if !self.queue.is_empty() => {}
+                arrival = from_session => {
+                    self.intake.hear(&mut datagram, &arrival?, &mut self.queue);
+                }
+                arrival = next_packet(&mut self.sensor, &mut packet) => {
+                    self.worker.take_packet(&packet, &arrival?);
+                }
+            }
+            self.take_waiting(&mut datagram, &mut packet)?;
+            self.answer();
+            let counts = self.sensor.as_ref().map(|sensor| &sensor.counts);
+            self.worker.note_drops(&self.intake, &self.queue, counts);
+            if is_due {
+                self.worker.send_status(&self.intake, &self.queue, counts);
+            }
+            // Health checks and signals have their turn even when there is always more to do.
+            tokio::task::yield_now().await;
+        }
+    }
+
+    /// Takes in what has come meanwhile.
+    fn take_waiting(
+        &mut self,
+        datagram: &mut Datagram,
+        packet: &mut Datagram,
+    ) -> Result<(), DaemonError> {
+        if let Some(receiver) = &mut self.receiver {
+            for _ in 0..MOST_AT_ONCE {
+                let Some(arrival) = receiver.receive_waiting(datagram)? else {
+                    break;
+                };
+                self.intake.hear(datagram, &arrival, &mut self.queue);
             }
         }
+        if let Some(sensor) = &mut self.sensor {
+            for _ in 0..MOST_AT_ONCE {
+                let Some(arrival) = sensor.receive_waiting(packet)? else {
+                    break;
+                };
+                self.worker.take_packet(packet, &arrival);
+            }
+        }
+        Ok(())
+    }
+
+    /// Answers the next message; or, if a revolution of packets is due, all that came before it, and it.
+    fn answer(&mut self) {
         for _ in 0..MOST_AT_ONCE {
-            let Some(arrival) = receiver.receive_waiting(&mut datagram)? else {
+            let Some(job) = self.queue.pop() else { break };
+            self.worker.answer(&job);
+            self.queue.recycle(job);
+            if !self.worker.is_due() {
                 break;
-            };
-            intake.hear(&mut datagram, &arrival, &mut queue);
+            }
         }
-        if let Some(job) = queue.pop() {
-            worker.answer(&job);
-            queue.recycle(job);
-        }
-        worker.note_drops(&intake, &queue);
-        // Health checks and signals have their turn even when there is always more to do.
-        tokio::task::yield_now().await;
+        self.worker.answer_packets();
+    }
+}
+
+/// Waits for a packet of a sensor; for ever if there is none.
+async fn next_packet(
+    sensor: &mut Option<SensorPorts>,
+    packet: &mut Datagram,
+) -> Result<listener::Arrival, SensorError> {
+    match sensor {
+        Some(sensor) => sensor.receive(packet).await,
+        None => pending().await,
     }
 }
 

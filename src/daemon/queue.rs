@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::mem::replace;
 
-use super::session::Datagram;
+use super::listener::Datagram;
 use crate::time::Time;
 
 /// A datagram with a sound envelope.

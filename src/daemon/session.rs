@@ -1,17 +1,12 @@
 //! A session on the network: UDP multicast 225.0.0.CID, port 12175.
 
-use std::fmt;
-use std::io::{self, IoSliceMut};
-use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
-use std::os::fd::{AsRawFd as _, RawFd};
+use std::io;
+use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 
-use nix::sys::socket::{ControlMessageOwned, MsgFlags, SockaddrIn, recvmsg, setsockopt, sockopt};
 use socket2::{Domain, Protocol, Socket, Type};
-use tokio::io::Interest;
 
+use super::listener::{Arrival, Datagram, Listener};
 use crate::config::SessionParameters;
-use crate::time::Time;
-use crate::wire::frame::MAX_DATAGRAM_LEN;
 
 /// Port of every OpenDaVINCI and OpenDLV session.
 const PORT: u16 = 12_175;
@@ -44,37 +39,15 @@ pub enum SessionError {
 /// The receiving side.
 #[derive(Debug)]
 pub struct Receiver {
-    socket: tokio::net::UdpSocket,
+    listener: Listener,
     group: SocketAddrV4,
     interface: Ipv4Addr,
-    own: Option<SocketAddr>,
-    buffer_bytes: usize,
-    control: Vec<u8>,
-}
-
-/// A datagram in a buffer of its own, which the kernel writes into.
-pub struct Datagram {
-    buffer: Box<[u8]>,
-    length: usize,
 }
 
 /// The sending side.
 #[derive(Debug)]
 pub struct Sender {
     socket: UdpSocket,
-}
-
-/// What the kernel says about a datagram.
-#[derive(Debug, Clone, Copy)]
-pub struct Arrival {
-    /// When it came in, by the kernel's stamp where there is one.
-    pub time: Time,
-    /// Who sent it.
-    pub source: SocketAddrV4,
-    /// Whether that was us.
-    pub is_own: bool,
-    /// Datagrams that the kernel has dropped on this socket since the beginning.
-    pub kernel_dropped: u64,
 }
 
 /// What a revolution takes of the receive buffer as the kernel counts it, measured with
@@ -102,25 +75,14 @@ impl Session {
     /// [`SessionError::Socket`] with what was tried.
     pub fn join(&self, parameters: &SessionParameters) -> Result<(Receiver, Sender), SessionError> {
         let (socket, interface) = self.receiving_socket()?;
-        let buffer_bytes = grown_buffer(&socket, parameters.receive_buffer_mb)
-            .map_err(self.failed("read the receive buffer's size"))?;
-        for result in [
-            setsockopt(&socket, sockopt::ReceiveTimestampns, &true),
-            setsockopt(&socket, sockopt::RxqOvfl, &1),
-        ] {
-            if let Err(error) = result {
-                tracing::info!("no kernel time stamps or drop counts: {error}");
-            }
-        }
         let sender = self.sender_on(interface, parameters.ttl)?;
+        let own = sender.socket.local_addr().ok();
+        let listener = Listener::new(socket, parameters.receive_buffer_mb, own)
+            .map_err(self.failed("watch the socket"))?;
         let receiver = Receiver {
-            socket: tokio::net::UdpSocket::from_std(socket.into())
-                .map_err(self.failed("watch the socket"))?,
+            listener,
             group: self.group(),
             interface: interface.unwrap_or(Ipv4Addr::UNSPECIFIED),
-            own: sender.socket.local_addr().ok(),
-            buffer_bytes,
-            control: nix::cmsg_space!(nix::sys::time::TimeSpec, u32),
         };
         Ok((receiver, sender))
     }
@@ -176,16 +138,6 @@ impl Session {
     }
 }
 
-/// Asks for a receive buffer: beyond the system's limit where we may, else up to it. Gives what
-/// the kernel granted.
-fn grown_buffer(socket: &Socket, wanted_mb: f64) -> io::Result<usize> {
-    let wanted = (wanted_mb * 1e6) as usize;
-    if setsockopt(socket, sockopt::RcvBufForce, &wanted).is_err() {
-        socket.set_recv_buffer_size(wanted)?;
-    }
-    socket.recv_buffer_size()
-}
-
 impl Receiver {
     /// The group that was joined.
     pub fn group(&self) -> SocketAddrV4 {
@@ -199,12 +151,12 @@ impl Receiver {
 
     /// The receive buffer that the kernel granted.
     pub fn buffer_bytes(&self) -> usize {
-        self.buffer_bytes
+        self.listener.buffer_bytes()
     }
 
     /// How long the buffer lasts with ten revolutions a second coming in.
     pub fn buffer_seconds(&self) -> f64 {
-        0.1 * (self.buffer_bytes / BUFFER_PER_REVOLUTION) as f64
+        0.1 * (self.listener.buffer_bytes() / BUFFER_PER_REVOLUTION) as f64
     }
 
     /// Waits for a datagram. Who stops waiting loses none.
@@ -212,17 +164,8 @@ impl Receiver {
     /// # Errors
     /// [`SessionError::Socket`] when the socket is of no more use.
     pub async fn receive(&mut self, datagram: &mut Datagram) -> Result<Arrival, SessionError> {
-        loop {
-            let (control, own) = (&mut self.control, self.own);
-            let fd = self.socket.as_raw_fd();
-            let taken = self
-                .socket
-                .async_io(Interest::READABLE, || take(fd, datagram, control, own))
-                .await;
-            if let Some(arrival) = self.checked(taken)? {
-                return Ok(arrival);
-            }
-        }
+        let taken = self.listener.receive(datagram).await;
+        taken.map_err(self.failed())
     }
 
     /// The next datagram if it has come already.
@@ -233,105 +176,18 @@ impl Receiver {
         &mut self,
         datagram: &mut Datagram,
     ) -> Result<Option<Arrival>, SessionError> {
-        loop {
-            let taken = take(
-                self.socket.as_raw_fd(),
-                datagram,
-                &mut self.control,
-                self.own,
-            );
-            if matches!(&taken, Err(error) if error.kind() == io::ErrorKind::WouldBlock) {
-                return Ok(None);
-            }
-            if let Some(arrival) = self.checked(taken)? {
-                return Ok(Some(arrival));
-            }
-        }
+        let taken = self.listener.receive_waiting(datagram);
+        taken.map_err(self.failed())
     }
 
-    fn checked(&self, taken: io::Result<Option<Arrival>>) -> Result<Option<Arrival>, SessionError> {
-        taken.map_err(|error| SessionError::Socket {
-            group: self.group,
+    fn failed(&self) -> impl FnOnce(io::Error) -> SessionError + use<> {
+        let group = self.group;
+        move |error| SessionError::Socket {
+            group,
             attempt: "receive",
             error,
-        })
-    }
-}
-
-impl Datagram {
-    /// What was received.
-    pub fn bytes(&self) -> &[u8] {
-        &self.buffer[..self.length]
-    }
-}
-
-impl Default for Datagram {
-    /// Nothing yet, with room for the longest datagram and a byte that tells a longer one.
-    fn default() -> Self {
-        Self {
-            buffer: vec![0; MAX_DATAGRAM_LEN + 1].into(),
-            length: 0,
         }
     }
-}
-
-impl From<&[u8]> for Datagram {
-    /// A copy that takes no more room than it needs.
-    fn from(bytes: &[u8]) -> Self {
-        Self {
-            buffer: bytes.into(),
-            length: bytes.len(),
-        }
-    }
-}
-
-impl fmt::Debug for Datagram {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Datagram of {} bytes", self.length)
-    }
-}
-
-/// `None` is a datagram from no IPv4 address.
-fn take(
-    fd: RawFd,
-    datagram: &mut Datagram,
-    control: &mut [u8],
-    own: Option<SocketAddr>,
-) -> io::Result<Option<Arrival>> {
-    let mut slices = [IoSliceMut::new(&mut datagram.buffer)];
-    let message = recvmsg::<SockaddrIn>(fd, &mut slices, Some(control), MsgFlags::empty())?;
-    let Some(source) = message.address else {
-        return Ok(None);
-    };
-    let source = SocketAddrV4::from(source);
-    let mut arrival = Arrival {
-        time: Time::ZERO,
-        source,
-        is_own: is_own(source, own),
-        kernel_dropped: 0,
-    };
-    for part in message.cmsgs()? {
-        match part {
-            ControlMessageOwned::ScmTimestampns(stamp) => {
-                let micros = stamp.tv_sec() * 1_000_000 + stamp.tv_nsec() / 1000;
-                arrival.time = Time::from_micros(micros);
-            }
-            ControlMessageOwned::RxqOvfl(dropped) => arrival.kernel_dropped = dropped.into(),
-            _ => {}
-        }
-    }
-    if arrival.time.is_zero() {
-        arrival.time = super::now();
-    }
-    datagram.length = message.bytes;
-    Ok(Some(arrival))
-}
-
-/// Whether a datagram is ours. A route without a source address makes it 0.0.0.0.
-fn is_own(source: SocketAddrV4, own: Option<SocketAddr>) -> bool {
-    own.is_some_and(|own| {
-        own.port() == source.port() && (own.ip() == *source.ip() || source.ip().is_unspecified())
-    })
 }
 
 impl Sender {

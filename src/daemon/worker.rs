@@ -2,24 +2,31 @@
 
 use std::time::Instant;
 
-use tracing::{debug, info, trace};
+use tracing::{debug, info, trace, warn};
 
 use super::fault_log::FaultLog;
 use super::health::Vitals;
 use super::intake::Intake;
 use super::latency::Latency;
+use super::listener::{Arrival, Datagram};
 use super::now;
 use super::queue::{Job, Queue};
+use super::sensor::SensorCounts;
 use super::session::Sender;
-use crate::cloud::Dialect;
+use crate::cloud::{ClockState, Dialect, PacketRefusal};
 use crate::ego::EgoReport;
 use crate::ground::Origin;
 use crate::odometry::Quality;
-use crate::pipeline::{Outcome, Pipeline, RevolutionReport, Step};
+use crate::pipeline::{Fault, Outcome, Pipeline, RevolutionReport, Step};
 use crate::tally::Tally;
+use crate::time::Time;
 use crate::view::Feed;
 use crate::wire::Envelope;
 use crate::wire::envelope::Postmark;
+use crate::wire::point_cloud::POINT_CLOUD_ID;
+use crate::wire::velodyne::Packet;
+use crate::wire::velodyne::data::{PACKET_LEN, ReturnMode};
+use crate::wire::velodyne::device_service::SweepAssembler;
 
 /// Every so many Status messages the log says what the latency is.
 const LOGGED: u64 = 60;
@@ -27,47 +34,94 @@ const LOGGED: u64 = 60;
 /// Owns the pipeline.
 pub(super) struct Worker<'a> {
     pipeline: Pipeline,
-    sender: Sender,
-    sender_stamp: u32,
+    output: Output,
+    /// Makes point clouds of packets, if they are to be published.
+    assembler: Option<SweepAssembler>,
+    /// When the packet came that closed a revolution which is not answered yet.
+    due: Option<Time>,
     receive_buffer: usize,
     vitals: &'a Vitals,
     start: Instant,
     latency: Latency,
     statuses: u64,
-    dialect: Option<Dialect>,
+    told: Told,
     ego: Option<EgoReport>,
+    /// Revolutions of packets that were dropped because the next one was there.
+    replaced: u64,
     dropped_revolutions: u64,
     log: FaultLog,
     frame: Vec<u8>,
-    view: Option<Feed>,
+}
+
+/// What was said of the sensor.
+#[derive(Debug, Default, PartialEq, Clone, Copy)]
+struct Told {
+    sensor: Option<(Dialect, usize)>,
+    clock: Option<(ClockState, Option<ReturnMode>)>,
+}
+
+/// Where answers go.
+pub(super) struct Output {
+    /// The session, if there is one.
+    pub(super) sender: Option<Sender>,
+    pub(super) sender_stamp: u32,
+    /// The view, if there is one.
+    pub(super) view: Option<Feed>,
+}
+
+impl Output {
+    /// Sends frames, and shows them; what cannot be sent is told.
+    fn send<'a>(&mut self, frames: impl IntoIterator<Item = &'a [u8]>, log: &mut FaultLog) {
+        for frame in frames {
+            if let Some(view) = &mut self.view {
+                view.put(frame);
+            }
+            if let Some(Err(error)) = self.sender.as_ref().map(|sender| sender.send(frame)) {
+                log.note("send", || error.to_string());
+            }
+        }
+    }
+
+    /// Says that work on a revolution begins.
+    fn begin(&mut self) {
+        if let Some(view) = &mut self.view {
+            view.begin();
+        }
+    }
+
+    /// Says that a step is done.
+    fn note(&mut self, step: Step) {
+        if let Some(view) = &mut self.view {
+            view.note(step);
+        }
+    }
 }
 
 impl<'a> Worker<'a> {
-    /// A worker that sends with `sender_stamp`, of a session with so many bytes of receive
-    /// buffer, and shows what it does in a view, if there is one.
+    /// A worker with so many bytes of receive buffer.
     pub(super) fn new(
         pipeline: Pipeline,
-        sender: Sender,
-        sender_stamp: u32,
+        output: Output,
+        publish_cloud: bool,
         receive_buffer: usize,
         vitals: &'a Vitals,
-        view: Option<Feed>,
     ) -> Self {
         Self {
             pipeline,
-            sender,
-            sender_stamp,
+            output,
+            assembler: publish_cloud.then(SweepAssembler::default),
+            due: None,
             receive_buffer,
             vitals,
             start: Instant::now(),
             latency: Latency::default(),
             statuses: 0,
-            dialect: None,
+            told: Told::default(),
             ego: None,
+            replaced: 0,
             dropped_revolutions: 0,
             log: FaultLog::default(),
             frame: vec![],
-            view,
         }
     }
 
@@ -78,62 +132,138 @@ impl<'a> Worker<'a> {
         let Ok((envelope, _)) = Envelope::from_datagram(job.datagram.bytes()) else {
             return;
         };
-        if let Some(view) = &mut self.view {
-            view.begin();
-        }
-        let note = |step| {
-            if let Some(view) = &mut self.view {
-                view.note(step);
-            }
-        };
-        match self.pipeline.handle_watched(&envelope, note) {
-            Ok(Outcome::Revolution(report)) => {
-                let processing_s = begin.elapsed().as_secs_f32();
-                let frames = self.pipeline.publish_objects(now(), processing_s);
-                send(&self.sender, frames, &mut self.log, &mut self.view);
-                self.latency.record(now() - job.arrival);
-                self.vitals.answered();
-                self.pipeline.update_map();
-                let frames = self.pipeline.publish_map(now());
-                send(&self.sender, frames, &mut self.log, &mut self.view);
-                if let Some(view) = &mut self.view {
-                    view.note(Step::Map);
-                    view.show(&self.pipeline, &report, None);
-                }
-                self.tell(&report);
-            }
+        self.output.begin();
+        let output = &mut self.output;
+        match self
+            .pipeline
+            .handle_watched(&envelope, |step| output.note(step))
+        {
+            Ok(Outcome::Revolution(report)) => self.publish(&report, job.arrival, begin),
             Ok(_) => {}
             Err(fault) => self.log.note(fault.name(), || fault.to_string()),
         }
     }
 
+    /// Takes a packet of a sensor.
+    pub(super) fn take_packet(&mut self, datagram: &Datagram, arrival: &Arrival) {
+        let packet = Packet {
+            source: arrival.source.ip().octets(),
+            arrival: arrival.time,
+            bytes: datagram.bytes(),
+        };
+        let taken = self.pipeline.take_packet(&packet);
+        let is_foreign = matches!(taken, Err(Fault::Packet(PacketRefusal::OtherSensor { .. })));
+        if !is_foreign && packet.bytes.len() == PACKET_LEN {
+            self.publish_cloud(&packet);
+        }
+        match taken {
+            Ok(true) => {
+                let before = self.due.replace(arrival.time);
+                self.replaced += u64::from(before.is_some());
+            }
+            Ok(false) => {}
+            Err(fault) => self.log.note(fault.name(), || fault.to_string()),
+        }
+    }
+
+    /// Sends the point clouds that a packet closes, as the device service does.
+    fn publish_cloud(&mut self, packet: &Packet<'_>) {
+        let Some(assembler) = &mut self.assembler else {
+            return;
+        };
+        // What is no packet was told of already.
+        for sweep in assembler.take(packet.bytes).unwrap_or_default() {
+            let postmark = Postmark {
+                sent: now(),
+                sampled: packet.arrival,
+                sender_stamp: self.output.sender_stamp,
+            };
+            self.frame.clear();
+            postmark.put_payload(&mut self.frame, POINT_CLOUD_ID, |out| {
+                sweep.cloud().encode(out)
+            });
+            self.output.send([&self.frame[..]], &mut self.log);
+        }
+    }
+
+    /// Whether a revolution of packets waits for its answer.
+    pub(super) fn is_due(&self) -> bool {
+        self.due.is_some()
+    }
+
+    /// Answers the revolution that packets have closed, if there is one.
+    pub(super) fn answer_packets(&mut self) {
+        let Some(arrival) = self.due.take() else {
+            return;
+        };
+        let begin = Instant::now();
+        self.output.begin();
+        let output = &mut self.output;
+        let report = self.pipeline.perceive_packets(|step| output.note(step));
+        self.publish(&report, arrival, begin);
+    }
+
+    /// Sends what answers a revolution.
+    fn publish(&mut self, report: &RevolutionReport, arrival: Time, begin: Instant) {
+        let processing_s = begin.elapsed().as_secs_f32();
+        let frames = self.pipeline.publish_objects(now(), processing_s);
+        self.output.send(frames, &mut self.log);
+        self.latency.record(now() - arrival);
+        self.vitals.answered();
+        self.pipeline.update_map();
+        let frames = self.pipeline.publish_map(now());
+        self.output.send(frames, &mut self.log);
+        if let Some(view) = &mut self.output.view {
+            view.note(Step::Map);
+            view.show(&self.pipeline, report, None);
+        }
+        self.tell(report);
+    }
+
     /// Notes what could not be answered.
-    pub(super) fn note_drops(&mut self, intake: &Intake, queue: &Queue) {
-        let revolutions = queue.dropped_revolutions;
+    pub(super) fn note_drops(
+        &mut self,
+        intake: &Intake,
+        queue: &Queue,
+        sensor: Option<&SensorCounts>,
+    ) {
+        let revolutions = queue.dropped_revolutions + self.replaced;
         if revolutions > self.dropped_revolutions {
             self.dropped_revolutions = revolutions;
             self.log.note("queue_dropped", || {
                 format!("{revolutions} revolutions so far: the pipeline is behind")
             });
         }
+        let kernel_dropped =
+            intake.kernel_dropped + sensor.map_or(0, |sensor| sensor.kernel_dropped);
         self.vitals
-            .dropped(revolutions + queue.dropped_others + intake.kernel_dropped);
+            .dropped(revolutions + queue.dropped_others + kernel_dropped);
     }
 
     /// Sends a Status.
-    pub(super) fn send_status(&mut self, intake: &Intake, queue: &Queue) {
+    pub(super) fn send_status(
+        &mut self,
+        intake: &Intake,
+        queue: &Queue,
+        sensor: Option<&SensorCounts>,
+    ) {
         let mut status = self.pipeline.status();
         let mut faults = self.pipeline.counts().faults.clone();
         faults.add(&intake.faults);
+        if let Some(sensor) = sensor {
+            faults.add(&sensor.faults);
+            status.datagrams_received += sensor.datagrams;
+            status.datagrams_kernel_dropped += sensor.kernel_dropped;
+        }
         faults.count_many("queue_dropped_poses", queue.dropped_others);
         let latency = self.latency.percentiles();
         status.uptime = self.start.elapsed().as_secs_f64();
         // Those that waited in vain were received, too.
         status.revolutions_received += queue.dropped_revolutions;
-        status.revolutions_queue_dropped = queue.dropped_revolutions;
-        status.datagrams_received = intake.datagrams;
+        status.revolutions_queue_dropped = queue.dropped_revolutions + self.replaced;
+        status.datagrams_received += intake.datagrams;
         status.datagrams_own = intake.own;
-        status.datagrams_kernel_dropped = intake.kernel_dropped;
+        status.datagrams_kernel_dropped += intake.kernel_dropped;
         status.datagrams_damaged += intake.damaged;
         status.faults = faults.to_string();
         status.latency_median = latency.median_s;
@@ -142,23 +272,18 @@ impl<'a> Worker<'a> {
         status.latency_max = latency.max_s;
         status.receive_buffer = self.receive_buffer as u32;
         status.healthy = self.vitals.verdict().is_ok();
-        if let Some(view) = &mut self.view {
+        if let Some(view) = &mut self.output.view {
             view.tell(&status);
         }
         let sent = now();
         let postmark = Postmark {
             sent,
             sampled: sent,
-            sender_stamp: self.sender_stamp,
+            sender_stamp: self.output.sender_stamp,
         };
         self.frame.clear();
         postmark.put(&mut self.frame, &status);
-        send(
-            &self.sender,
-            [&self.frame[..]],
-            &mut self.log,
-            &mut self.view,
-        );
+        self.output.send([&self.frame[..]], &mut self.log);
         trace!("{status:?}");
         debug!("{}", summary(&self.pipeline, latency.median_s));
         self.statuses += 1;
@@ -182,16 +307,44 @@ impl<'a> Worker<'a> {
             intensity_bits,
             ..
         } = report.dialect;
-        if self.dialect.replace(report.dialect) != Some(report.dialect) {
+        let packets = self.pipeline.packets();
+        let told = Told {
+            sensor: Some((report.dialect, packets.firings_per_column())),
+            clock: packets.mode().map(|mode| (packets.clock(), Some(mode))),
+        };
+        let before = std::mem::replace(&mut self.told, told);
+        if before.sensor != told.sensor {
             info!(
-                "{}: {} columns at {:.1} Hz, distances {} ({}), unit {} mm, {intensity_bits} bits of intensity",
+                "{}: {} columns at {:.1} Hz{}, distances {} ({}), unit {} mm, {intensity_bits} bits of intensity",
                 report.sensor,
                 report.columns,
                 report.rotation_hz,
+                match packets.firings_per_column() {
+                    1 => "",
+                    _ => ", each of two firings",
+                },
                 byte_order.name(),
                 byte_order_source.name(),
                 1000.0 * unit_m,
             );
+        }
+        if let Some(mode) = packets.mode().filter(|_| before.clock != told.clock) {
+            let ahead_s = packets.clock_ahead().seconds();
+            let mode = mode.name();
+            match packets.clock() {
+                ClockState::Free => info!(
+                    "{mode}; no GPS receiver keeps the sensor's clock: revolutions have the time of their arrival"
+                ),
+                ClockState::Configured => {
+                    info!("{mode}; revolutions have the time of their arrival, as configured")
+                }
+                ClockState::Synchronised => info!(
+                    "{mode}; revolutions have the sensor's time, which is {ahead_s:.3} s ahead of this computer's"
+                ),
+                ClockState::Apart => warn!(
+                    "{mode}; the sensor's time is {ahead_s:.0} s ahead of this computer's: revolutions have that of their arrival"
+                ),
+            }
         }
         if report.time_jumped {
             self.log.note("time_jump", || {
@@ -261,21 +414,4 @@ fn summary(pipeline: &Pipeline, latency_s: f32) -> String {
         "{revolutions} revolutions, {objects} objects now: {classes}; latency {:.1} ms",
         1000.0 * latency_s
     )
-}
-
-/// Sends frames, and shows them; what cannot be sent is told.
-fn send<'a>(
-    sender: &Sender,
-    frames: impl IntoIterator<Item = &'a [u8]>,
-    log: &mut FaultLog,
-    view: &mut Option<Feed>,
-) {
-    for frame in frames {
-        if let Some(view) = view {
-            view.put(frame);
-        }
-        if let Err(error) = sender.send(frame) {
-            log.note("send", || error.to_string());
-        }
-    }
 }

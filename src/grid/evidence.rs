@@ -245,6 +245,7 @@ pub(super) fn gather(
     evidence.nearest_m.clear();
     evidence.columns = columns.clone();
     let ranges_m = scan.range_m().as_chunks::<MAX_LAYERS>().0;
+    let reached_m = scan.reached_m().as_chunks::<MAX_LAYERS>().0;
     let heights_m = heights_m.as_chunks::<MAX_LAYERS>().0;
     let ground = ground.as_chunks::<MAX_LAYERS>().0;
     let is_round = scan.sensor().sees_all_round();
@@ -253,7 +254,7 @@ pub(super) fn gather(
             evidence.push_none();
             continue;
         };
-        let ranges_m = &ranges_m[column];
+        let (ranges_m, reached_m) = (&ranges_m[column], &reached_m[column]);
         let [sine, cosine] = scan.direction(column);
         let level = normal[0] * sine + normal[1] * cosine;
         let mut runs = [0.0; MAX_LAYERS];
@@ -288,7 +289,7 @@ pub(super) fn gather(
             is_obstacle[layer] = is_near & !ground[column][layer] & is_body;
             runs[layer] = run;
             ends_m[layer] = if has_return {
-                distance_m - BEFORE_RETURN_M
+                reached_m[layer] * cosines[layer] - BEFORE_RETURN_M
             } else {
                 unseen_m
             };

@@ -1,7 +1,8 @@
 //! A synthetic VLP-16 that drives through a scene, with the truth of every revolution.
 //!
 //! `solid` has the geometry of rays, `body` road users as solids, `terrain` and `scenery` the
-//! rest of a scene, `path` motion, `scenes` the scenes, `fixes` the vehicle's pose messages, `map` the true map. This
+//! rest of a scene, `path` motion, `scenes` the scenes, `fixes` the vehicle's pose messages, `packets` what the sensor
+//! itself sends, `map` the true map. This
 //! file is the sensor: columns one after the other, each at its own time, while the vehicle and
 //! the scene move.
 //!
@@ -13,6 +14,8 @@ mod body;
 mod fixes;
 
 pub mod map;
+
+mod packets;
 
 pub mod path;
 
@@ -33,8 +36,10 @@ use crate::random::Random;
 use crate::time::{Span, Time};
 use crate::wire::envelope::Postmark;
 use crate::wire::point_cloud::{CompactPointCloud, POINT_CLOUD_ID};
+use crate::wire::velodyne::Packet;
 use fixes::Receiver;
 use map::{Surveyor, TrueMap};
+use packets::PacketStream;
 use path::Moment;
 use scenario::{Class, PoseMessages, Scenario, Scene};
 use sight::{Carrier, Sight, Surface};
@@ -57,7 +62,7 @@ const THRESHOLD: f64 = 1.8e-5;
 const SHARPNESS: f64 = 4.0;
 /// Range of the sensor.
 const RANGE_M: std::ops::Range<f64> = 0.4..100.0;
-/// Distances are sent in centimetres.
+/// Point clouds have distances in centimetres.
 const UNIT_M: f64 = 0.01;
 
 /// What was true at the end of a revolution.
@@ -108,6 +113,7 @@ pub struct Simulation {
     column: u64,
     distances: Vec<u8>,
     labels: Vec<i32>,
+    packets: Option<PacketStream>,
     surveyor: Option<Surveyor>,
 }
 
@@ -135,7 +141,17 @@ impl Simulation {
             column: 0,
             distances: vec![],
             labels: vec![],
+            packets: None,
             surveyor: None,
+        }
+    }
+
+    /// The same, for [`Simulation::revolve_in_packets`]: every laser looks where the sensor has turned to when it
+    /// fires, and not all of a column in one direction.
+    pub fn in_packets(scenario: Scenario, seed: u64) -> Self {
+        Self {
+            packets: Some(PacketStream::default()),
+            ..Self::new(scenario, seed)
         }
     }
 
@@ -160,17 +176,8 @@ impl Simulation {
     /// Turns the sensor once. Appends the frames of the vehicle's poses up to its end, and then
     /// the revolution as the OpenDLV device service sends it. Gives the truth at its end.
     pub fn revolve(&mut self, out: &mut Vec<u8>) -> Truth {
-        self.distances.clear();
-        self.labels.clear();
-        let mut hits = vec![0; self.scene.actors.len()];
         let first = self.column;
-        let parts = sight::parts(&self.scene, seconds_of(first));
-        while turn_of(self.column) == turn_of(first) {
-            self.cast_column(&parts, &mut hits);
-            self.column += 1;
-        }
-        // The first packet of the next revolution closes this one.
-        let time = EPOCH + Span::from_seconds(seconds_of(self.column));
+        let (time, hits) = self.turn();
         self.put_fixes(out);
         let cloud = CompactPointCloud {
             start_azimuth_deg: azimuth_deg(first) as f32,
@@ -186,6 +193,46 @@ impl Simulation {
         };
         postmark.put_payload(out, POINT_CLOUD_ID, |out| cloud.encode(out));
         self.truth(time, &hits)
+    }
+
+    /// Turns the sensor once, and hands over what it sends meanwhile. Gives the truth at the end of the revolution,
+    /// which the first packet of the next one closes. There are no poses.
+    pub fn revolve_in_packets(&mut self, send: impl FnMut(&Packet<'_>)) -> Truth {
+        let (time, hits) = self.turn();
+        self.send_packets(send);
+        self.truth(time, &hits)
+    }
+
+    /// Turns the sensor on by one packet, which closes the last revolution.
+    pub fn close_packets(&mut self, send: impl FnMut(&Packet<'_>)) {
+        let parts = sight::parts(&self.scene, seconds_of(self.column));
+        let mut hits = vec![0; self.scene.actors.len()];
+        for _ in 0..packets::FIRINGS {
+            self.cast_column(&parts, &mut hits);
+            self.column += 1;
+        }
+        self.send_packets(send);
+    }
+
+    fn send_packets(&mut self, send: impl FnMut(&Packet<'_>)) {
+        if let Some(packets) = &mut self.packets {
+            packets.send(send);
+        }
+    }
+
+    /// Casts the columns of a turn. Gives when it is over, and how often each road user was hit.
+    fn turn(&mut self) -> (Time, Vec<usize>) {
+        self.distances.clear();
+        self.labels.clear();
+        let mut hits = vec![0; self.scene.actors.len()];
+        let first = self.column;
+        let parts = sight::parts(&self.scene, seconds_of(first));
+        while turn_of(self.column) == turn_of(first) {
+            self.cast_column(&parts, &mut hits);
+            self.column += 1;
+        }
+        // The first packet of the next revolution closes this one.
+        (EPOCH + Span::from_seconds(seconds_of(self.column)), hits)
     }
 
     fn put_fixes(&mut self, out: &mut Vec<u8>) {
@@ -209,12 +256,19 @@ impl Simulation {
 
     fn cast_column(&mut self, parts: &[Vec<solid::Solid>], hits: &mut [usize]) {
         let azimuth_rad = azimuth_deg(self.column).to_radians();
+        if let Some(packets) = &mut self.packets {
+            packets.begin(self.column);
+        }
         let sight = Sight::new(&self.scene, parts, seconds_of(self.column), azimuth_rad);
         for (layer, elevation_deg) in VLP16.elevation_deg.iter().enumerate() {
             // Every ray has its own luck, so that one scene's noise does not depend on another.
             let number = self.column * VLP16.elevation_deg.len() as u64 + layer as u64;
             let luck = &mut Random::new(self.seed ^ number.wrapping_mul(0x2545_f491_4f6c_dd1d));
-            let ray = sight.ray(azimuth_rad, elevation_deg.to_radians());
+            let later_rad = self
+                .packets
+                .as_ref()
+                .map_or(0.0, |_| packets::turned_rad(layer));
+            let ray = sight.ray(azimuth_rad + later_rad, elevation_deg.to_radians());
             let nearest = sight.nearest(&ray, luck);
             if let Some(surveyor) = &mut self.surveyor {
                 let end = nearest.map(|(hit, surface)| (hit.range_m, surface));
@@ -222,9 +276,15 @@ impl Simulation {
                 let follow = (self.column + turn_of(self.column)).is_multiple_of(3);
                 surveyor.note(&self.scene, seconds_of(self.column), &ray, end, follow);
             }
-            let units = nearest.map_or(0, |(hit, _)| {
-                measured(&hit, self.scene.range_deviation_m, luck)
-            });
+            let range_m =
+                nearest.and_then(|(hit, _)| measured(&hit, self.scene.range_deviation_m, luck));
+            if let (Some(packets), Some((hit, _)), Some(range_m)) =
+                (&mut self.packets, nearest, range_m)
+            {
+                packets.put(layer, range_m, hit.reflectance);
+            }
+            // Cut off, as the device service does.
+            let units = range_m.map_or(0, |range_m| (range_m / UNIT_M) as u16);
             let label = match nearest {
                 _ if units == 0 => label::NO_RETURN,
                 None => label::NO_RETURN,
@@ -278,19 +338,16 @@ impl Simulation {
     }
 }
 
-/// Centimetres, cut off as the device service does, or 0 where nothing comes back.
-fn measured(hit: &Hit, range_deviation_m: f64, luck: &mut Random) -> u16 {
+/// The range that is measured, if anything comes back.
+fn measured(hit: &Hit, range_deviation_m: f64, luck: &mut Random) -> Option<f64> {
     let signal = hit.reflectance * hit.incidence / (hit.range_m * hit.range_m);
     let seen = 1.0 / (1.0 + (THRESHOLD / signal.max(1e-12)).powf(SHARPNESS));
     // At a grazing angle the spot is long, and the range is that of some part of it.
     let footprint_m = hit.range_m * BEAM_RAD / hit.incidence.max(0.02);
     let deviation_m = libm::hypot(range_deviation_m, FOOTPRINT_SHARE * footprint_m);
     let range_m = hit.range_m + deviation_m * luck.normal();
-    if RANGE_M.contains(&range_m) && luck.uniform() < seen * (1.0 - DROPOUTS) {
-        (range_m / UNIT_M) as u16
-    } else {
-        0
-    }
+    let comes_back = RANGE_M.contains(&range_m) && luck.uniform() < seen * (1.0 - DROPOUTS);
+    comes_back.then_some(range_m)
 }
 
 fn seconds_of(column: u64) -> f64 {

@@ -71,8 +71,9 @@ impl Sight {
                     continue;
                 };
                 sight.rays += 1.0;
-                let range_m = f64::from(scan.range_m()[scan.index(column, layer)]);
-                let reached_m = range_m * cosine;
+                let point = scan.index(column, layer);
+                let range_m = f64::from(scan.range_m()[point]);
+                let reached_m = f64::from(scan.reached_m()[point]) * cosine;
                 if range_m < 0.0 {
                     sight.blocked += 1.0;
                 } else if range_m == 0.0 {

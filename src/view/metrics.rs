@@ -86,11 +86,12 @@ fn families(status: &Status) -> Vec<Family> {
     let quantile =
         |share: f64, seconds: f32| (format!("{{quantile=\"{share}\"}}"), f64::from(seconds));
     let found = format!(
-        "{{version=\"{}\",profile=\"{}\",sensor=\"{}\",byte_order=\"{}\",odometry=\"{}\",pose_source=\"{}\"}}",
+        "{{version=\"{}\",profile=\"{}\",sensor=\"{}\",byte_order=\"{}\",sensor_clock=\"{}\",odometry=\"{}\",pose_source=\"{}\"}}",
         status.version,
         status.profile,
         status.sensor,
         status.byte_order,
+        status.sensor_clock,
         status.odometry,
         status.pose_source
     );
@@ -129,6 +130,16 @@ fn families(status: &Status) -> Vec<Family> {
             "datagrams_damaged_total",
             status.datagrams_damaged,
             "Datagrams that were no sound envelope",
+        ),
+        counter(
+            "packets_received_total",
+            status.packets_received,
+            "Packets of the sensor itself",
+        ),
+        counter(
+            "packets_lost_total",
+            status.packets_lost,
+            "Packets of the sensor that never came",
         ),
         counter(
             "poses_received_total",

@@ -2,8 +2,8 @@
 //!
 //! Little-endian: the length of a heading in bytes and the heading, which is JSON; the number of
 //! points, then x, y and z of all of them as 16-bit centimetres from the heading's origin in the
-//! local frame's directions, and a byte for each that says what it is; then the frames that
-//! were published, as they were sent.
+//! local frame's directions, and a byte for each that says what it is; how many of them have a reflectivity (all or none),
+//! and a byte for each of these; then the frames that were published, as they were sent.
 
 use serde::Serialize;
 
@@ -23,8 +23,10 @@ const FIRST_OBJECT: u8 = 128;
 /// Farther from the sensor along an axis than 16 bits of centimetres reach, metres.
 const FARTHEST_M: f64 = 327.0;
 
-/// Points in a picture. With this many a picture, its map tiles among it, stays below 200 kB.
-const MOST_POINTS: usize = 22_000;
+/// Bytes of points in a picture. With so many a picture, its map tiles among it, stays below 200 kB.
+const MOST_BYTES: usize = 154_000;
+/// Bytes of a point without its reflectivity.
+const POINT_BYTES: usize = 7;
 
 /// Returns so far outside of an object's box are taken for its own, metres: boxes are tight.
 const MARGIN_M: f64 = 0.3;
@@ -74,8 +76,8 @@ pub(super) struct Painter {
     kinds: Vec<u8>,
     /// By how much the points of an object went on until the end of the sweep.
     shifts_m: Vec<[f32; 2]>,
-    /// Places from the origin in centimetres, and what is there.
-    points: Vec<([i16; 3], u8)>,
+    /// Places from the origin in centimetres, what is there, and its reflectivity.
+    points: Vec<([i16; 3], u8, u8)>,
 }
 
 impl Painter {
@@ -164,23 +166,32 @@ impl Painter {
         out.extend_from_slice(&json);
 
         self.points.clear();
+        let reflectivity = around.scan.reflectivity();
         for point in (0..around.scan.len()).filter(|point| around.scan.has_return(*point)) {
             let (place_m, [dx, dy]) = (around.place_m(point), self.shifts_m[point].map(f64::from));
             let [x, y, z] = [0, 1, 2].map(|axis| place_m[axis] - around.sensor.position_m[axis]);
             let from_origin_m = [x + dx, y + dy, z];
             if from_origin_m.iter().all(|metres| metres.abs() < FARTHEST_M) {
                 let centimetres = from_origin_m.map(|metres| (100.0 * metres) as i16);
-                self.points.push((centimetres, self.kinds[point]));
+                let bright = reflectivity.get(point).copied().unwrap_or_default();
+                self.points.push((centimetres, self.kinds[point], bright));
             }
         }
-        let step = self.points.len().div_ceil(MOST_POINTS).max(1);
+        let bytes = POINT_BYTES + usize::from(!reflectivity.is_empty());
+        let step = self.points.len().div_ceil(MOST_BYTES / bytes).max(1);
         let points = self.points.iter().step_by(step);
         put_length(out, points.len());
         for axis in 0..3 {
-            let along = points.clone().map(|(centimetres, _)| centimetres[axis]);
+            let along = points.clone().map(|(centimetres, ..)| centimetres[axis]);
             out.extend(along.flat_map(i16::to_le_bytes));
         }
-        out.extend(points.map(|(_, kind)| kind));
+        out.extend(points.clone().map(|(_, kind, _)| kind));
+        if reflectivity.is_empty() {
+            put_length(out, 0);
+        } else {
+            put_length(out, points.len());
+            out.extend(points.map(|(.., bright)| bright));
+        }
     }
 }
 
@@ -223,13 +234,17 @@ pub(super) fn thinned(picture: &[u8]) -> Option<Vec<u8>> {
     let points = length(points_at)?;
     let begin = points_at + 4;
     let (places, rest) = picture.get(begin..)?.split_at_checked(6 * points)?;
-    let (kinds, frames) = rest.split_at_checked(points)?;
+    let (kinds, rest) = rest.split_at_checked(points)?;
+    let bright_at = begin + 7 * points;
+    let (bright, frames) = rest.get(4..)?.split_at_checked(length(bright_at)?)?;
     let mut thin = picture[..points_at].to_vec();
     put_length(&mut thin, points.div_ceil(THINNING));
     for axis in places.chunks(2 * points.max(1)) {
         thin.extend(axis.chunks(2).step_by(THINNING).flatten());
     }
     thin.extend(kinds.iter().step_by(THINNING));
+    put_length(&mut thin, bright.len().div_ceil(THINNING));
+    thin.extend(bright.iter().step_by(THINNING));
     thin.extend_from_slice(frames);
     Some(thin)
 }
@@ -266,6 +281,7 @@ mod tests {
         heading: serde_json::Value,
         places_m: Vec<[f64; 3]>,
         kinds: Vec<u8>,
+        bright: Vec<u8>,
         rest: Vec<u8>,
     }
 
@@ -274,6 +290,8 @@ mod tests {
             |at: usize| u32::from_le_bytes(picture[at..at + 4].try_into().unwrap()) as usize;
         let (json, points) = (length(0), length(4 + length(0)));
         let begin = 8 + json;
+        let bright = begin + 7 * points;
+        let bright = bright + 4..bright + 4 + length(bright);
         let centimetres = |axis: usize, point: usize| {
             let at = begin + 2 * (axis * points + point);
             f64::from(i16::from_le_bytes([picture[at], picture[at + 1]]))
@@ -284,7 +302,8 @@ mod tests {
                 .map(|point| [0, 1, 2].map(|axis| 0.01 * centimetres(axis, point)))
                 .collect(),
             kinds: picture[begin + 6 * points..begin + 7 * points].to_vec(),
-            rest: picture[begin + 7 * points..].to_vec(),
+            rest: picture[bright.end..].to_vec(),
+            bright: picture[bright].to_vec(),
         }
     }
 
@@ -333,6 +352,30 @@ mod tests {
                 object.points
             );
         }
+    }
+
+    #[test]
+    fn points_of_a_sensors_own_packets_have_a_reflectivity() {
+        let scene = scenario::find("roundabout").unwrap();
+        let mut simulation = Simulation::in_packets(scene, 1);
+        let mut pipeline = Pipeline::new(&Configuration::default(), 0);
+        for _ in 0..2 {
+            simulation.revolve_in_packets(|packet| {
+                if pipeline.take_packet(packet) == Ok(true) {
+                    pipeline.perceive_packets(|_| ());
+                }
+            });
+        }
+        let around = Around::of(&pipeline, 1.9);
+        let (mut painter, mut bytes) = (Painter::default(), vec![]);
+        painter.label_none(around.scan);
+        painter.paint(&around, &[], None, &mut bytes);
+        assert!(bytes.len() < 180_000, "{}", bytes.len());
+        let (whole, thin) = (read(&bytes), read(&thinned(&bytes).unwrap()));
+        assert_eq!(whole.bright.len(), whole.kinds.len());
+        assert!(whole.bright.iter().all(|bright| (1..=100).contains(bright)));
+        let fourth: Vec<_> = whole.bright.iter().copied().step_by(4).collect();
+        assert_eq!(thin.bright, fourth);
     }
 
     #[test]

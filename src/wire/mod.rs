@@ -16,7 +16,7 @@ pub mod message;
 
 pub mod point_cloud;
 
-pub mod vlp16_packet;
+pub mod velodyne;
 
 pub mod pose;
 
@@ -59,6 +59,7 @@ pub fn known_name(data_type: i32) -> Option<&'static str> {
         object_list::ObjectList,
         grid_tile::GridTile,
         status::Status,
+        velodyne::captured::SensorPackets,
         opendlv::ObjectFrameStart,
         opendlv::ObjectFrameEnd,
         opendlv::ObjectAnnouncement,

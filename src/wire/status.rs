@@ -86,5 +86,16 @@ super::message! {
         40 => own_vehicle_back: f32,
         /// Highest y.
         41 => own_vehicle_front: f32,
+        /// Packets of a sensor that is listened to without any other service.
+        42 => packets_received: u64,
+        /// Packets that never came, by the sensor's time stamps.
+        43 => packets_lost: u64,
+        /// Packets that came out of order and were put in their place.
+        44 => packets_late: u64,
+        /// Which returns the packets hold: strongest return, last return or dual return.
+        45 => return_mode: String,
+        /// Whose time revolutions of packets have: the sensor's where a GPS receiver keeps it (synchronised), or that of the
+        /// arrival, because none does (free), it is more than 10 s away (apart), or so configured (configured).
+        46 => sensor_clock: String,
     }
 }

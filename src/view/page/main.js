@@ -19,7 +19,7 @@ const camera = new Camera();
 
 // All that is known; the tests of the page read it, too.
 const world = {
-  map: new GridMap(), layers: { map: true, points: true, trails: true, labels: true },
+  map: new GridMap(), layers: { map: true, points: true, reflectivity: false, trails: true, labels: true },
   objects: [], labels: [], ratio: 1, pictures: 0, connected: false, selected: null, heard: 0,
 };
 window.kreisel = world;
@@ -99,6 +99,7 @@ function take({ heading, points, messages }) {
     if (!last || Math.hypot(x - last[0], y - last[1]) > 0.5) path.push([x, y]);
     if (path.length > 4000) path.shift();
   }
+  byId("reflectivity").hidden = !points.reflectivity.length;
   say("");
   showPlayer(heading.player);
   redraw();

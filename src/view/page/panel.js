@@ -24,6 +24,7 @@ export function showStatus(status, rate) {
     }));
   if (status.queueDropped) losses["dropped: behind"] = status.queueDropped;
   if (status.kernelDropped) losses["dropped: buffer full"] = status.kernelDropped;
+  if (status.packetsLost) losses["packets lost"] = status.packetsLost;
   if (status.damaged) losses["damaged datagrams"] = status.damaged;
   fill("losses", Object.keys(losses).length ? losses : { none: "" });
 
@@ -34,6 +35,10 @@ export function showStatus(status, rate) {
     detected["byte order"] = `${status.byteOrder} (${status.byteOrderSource})`;
     detected["distance unit"] = `${(1000 * status.distanceUnit).toFixed(0)} mm`;
     detected["sensor height"] = `${status.groundHeight.toFixed(2)} m`;
+    if (status.packets) {
+      detected.returns = status.returnMode;
+      detected["sensor's clock"] = status.sensorClock;
+    }
     detected.odometry = status.odometry;
     detected["pose source"] = status.poseSource;
     if (status.poseSource !== "none") detected["poses and odometry apart"] = `${status.poseDisagreement.toFixed(2)} m`;

@@ -107,19 +107,25 @@ function line(context, camera, places) {
   context.stroke();
 }
 
-function drawPoints(context, camera, { points, heading }, colours) {
+function drawPoints(context, camera, { points, heading, layers }, colours) {
   if (!points) return;
+  const isBright = layers.reflectivity && points.reflectivity.length > 0;
   const [east, north, up] = heading.origin_m;
   const size = Math.min(3, Math.max(1.4, camera.pixelsPerMetre * 0.12));
   let last = null;
   for (let point = 0; point < points.count; point++) {
-    const colour = colourOf(points.kind[point], colours);
+    const colour = isBright ? brightness(points.reflectivity[point], colours) : colourOf(points.kind[point], colours);
     if (colour !== last) context.fillStyle = last = colour;
     const [left, top] = camera.project(
       east + points.x[point] / 100, north + points.y[point] / 100, up + points.z[point] / 100);
     context.fillRect(left - size / 2, top - size / 2, size, size);
   }
 }
+
+// From dark blue over green to red; what throws light back by itself stands out.
+const BRIGHTNESS = Array.from({ length: 11 }, (_, tenth) => `hsl(${250 - 24 * tenth} 75% 52%)`);
+
+const brightness = (value, colours) => (value > 100 ? colours.text : BRIGHTNESS[Math.round(value / 10)]);
 
 function colourOf(kind, colours) {
   if (kind === 0) return colours.ground;

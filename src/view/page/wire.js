@@ -27,6 +27,7 @@ const STATUS = {
   20: ["byteOrderSource", text], 21: ["distanceUnit", f32], 23: ["groundHeight", f32], 28: ["healthy", bool],
   29: ["profile", text], 30: ["version", text], 32: ["odometry", text], 33: ["odometryDeviation", f32],
   34: ["odometryRestarts", u32], 35: ["poseSource", text], 36: ["poseDisagreement", f32], 37: ["poseJumps", u32],
+  42: ["packets", u32], 43: ["packetsLost", u32], 45: ["returnMode", text], 46: ["sensorClock", text],
 };
 
 const KINDS = { 2021: ["list", OBJECT_LIST], 2022: ["tile", GRID_TILE], 2023: ["status", STATUS] };
@@ -140,11 +141,14 @@ export function readPicture(buffer) {
   const count = view.getUint32(4 + headingLength, true);
   const begin = 8 + headingLength;
   const axis = (number) => new Int16Array(buffer.slice(begin + 2 * count * number, begin + 2 * count * (number + 1)));
+  const bright = begin + 7 * count;
+  const brightCount = view.getUint32(bright, true);
   const points = {
     count, x: axis(0), y: axis(1), z: axis(2),
     kind: new Uint8Array(buffer, begin + 6 * count, count),
+    reflectivity: new Uint8Array(buffer, bright + 4, brightCount),
   };
-  return { heading, points, messages: [...messages(new Uint8Array(buffer, begin + 7 * count))] };
+  return { heading, points, messages: [...messages(new Uint8Array(buffer, bright + 4 + brightCount))] };
 }
 
 // Tiles of a daemon have 64 cells a side.

@@ -1,39 +1,13 @@
-//! VLP-16 data packets to point clouds, as the OpenDLV device service makes them: the same
-//! distances and azimuths, byte for byte, its limits included.
+//! Data packets to point clouds, as the OpenDLV device service makes them: the same distances and
+//! azimuths, byte for byte, its limits included.
 
-use super::point_cloud::{ByteOrder, CompactPointCloud};
+use super::data::{BLOCKS, DataPacket, LASER_BY_LAYER, LASERS, PacketError};
+use crate::wire::point_cloud::{ByteOrder, CompactPointCloud};
 
-/// Length of a data packet's UDP payload (VLP-16 user manual, chapter 9).
-pub const PACKET_LEN: usize = 1206;
-
-const BLOCKS: usize = 12;
-const BLOCK_LEN: usize = 100;
-const BLOCK_FLAG: [u8; 2] = [0xff, 0xee];
-const CHANNELS: usize = 16;
-const CHANNEL_LEN: usize = 3;
-/// Lasers of a firing by rising elevation: they fire as -15, 1, -13, 3, ... 15 degrees.
-const LASER_BY_LAYER: [usize; CHANNELS] = [0, 2, 4, 6, 8, 10, 12, 14, 1, 3, 5, 7, 9, 11, 13, 15];
 /// Distances are in units of 2 mm and leave in centimetres, cut off.
 const UNITS_PER_CENTIMETRE: u16 = 5;
 /// The device service stores no more columns than this (30,000 points).
-const MOST_COLUMNS: usize = 30_000 / CHANNELS;
-
-/// Why a payload is no data packet.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum PacketError {
-    /// Not the length of a data packet.
-    #[error("{length} bytes, a VLP-16 data packet has {PACKET_LEN}")]
-    Length {
-        /// Its length.
-        length: usize,
-    },
-    /// A block does not begin with its flag.
-    #[error("block {block} does not begin with ff ee")]
-    Flag {
-        /// Which block, from 0.
-        block: usize,
-    },
-}
+const MOST_COLUMNS: usize = 30_000 / LASERS;
 
 /// A revolution that is complete.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,7 +23,7 @@ impl Sweep {
         CompactPointCloud {
             start_azimuth_deg: self.start_azimuth_deg,
             end_azimuth_deg: self.end_azimuth_deg,
-            layers: CHANNELS as u8,
+            layers: LASERS as u8,
             distances: &self.distances,
             ..CompactPointCloud::default()
         }
@@ -67,7 +41,7 @@ pub struct SweepAssembler {
 impl SweepAssembler {
     /// Columns that wait for their revolution's end.
     pub fn pending_columns(&self) -> usize {
-        self.distances.len() / (2 * CHANNELS)
+        self.distances.len() / (2 * LASERS)
     }
 
     /// Takes one packet; gives the revolutions that it closes.
@@ -75,38 +49,33 @@ impl SweepAssembler {
     /// # Errors
     /// [`PacketError`] when it is no data packet; it is then passed over as a whole.
     pub fn take(&mut self, packet: &[u8]) -> Result<Vec<Sweep>, PacketError> {
-        if packet.len() != PACKET_LEN {
-            return Err(PacketError::Length {
-                length: packet.len(),
-            });
-        }
-        let blocks: Vec<&[u8]> = packet.chunks_exact(BLOCK_LEN).take(BLOCKS).collect();
-        if let Some(block) = blocks.iter().position(|block| block[..2] != BLOCK_FLAG) {
-            return Err(PacketError::Flag { block });
-        }
+        let packet = DataPacket::new(packet)?;
         let mut closed = vec![];
-        let mut first_deg = azimuth_deg(blocks[0]);
+        let mut first_deg = packet.raw_azimuth_deg(0);
         let mut half_step_deg = 0.0;
-        for (index, block) in blocks.iter().enumerate() {
+        for block in 0..BLOCKS {
             // The last block has no next one and goes on as the one before. Azimuths past the
             // end of the circle come back by subtraction, which rounds: the device's do, too.
-            let next_deg = blocks.get(index + 1).map(|next| match azimuth_deg(next) {
+            let next_deg = (block + 1 < BLOCKS).then(|| match packet.raw_azimuth_deg(block + 1) {
                 next_deg if next_deg < first_deg => next_deg + 360.0,
                 next_deg => next_deg,
             });
             if let Some(next_deg) = next_deg {
                 half_step_deg = (next_deg - first_deg) / 2.0;
             }
-            let (first, second) = block[4..].split_at(CHANNELS * CHANNEL_LEN);
-            closed.extend(self.take_firing(first_deg, first));
-            closed.extend(self.take_firing(on_circle(first_deg + half_step_deg), second));
+            let second_deg = on_circle(first_deg + half_step_deg);
+            for (firing, azimuth_deg) in [first_deg, second_deg].into_iter().enumerate() {
+                let distances =
+                    LASER_BY_LAYER.map(|laser| packet.at(block, firing, laser).distance);
+                closed.extend(self.take_firing(azimuth_deg, distances));
+            }
             first_deg = on_circle(next_deg.unwrap_or(first_deg));
         }
         Ok(closed)
     }
 
     /// A step back in azimuth closes the revolution.
-    fn take_firing(&mut self, azimuth_deg: f32, channels: &[u8]) -> Option<Sweep> {
+    fn take_firing(&mut self, azimuth_deg: f32, distances: [u16; LASERS]) -> Option<Sweep> {
         let closed = (azimuth_deg < self.previous_azimuth_deg).then(|| Sweep {
             start_azimuth_deg: std::mem::replace(&mut self.start_azimuth_deg, azimuth_deg),
             end_azimuth_deg: self.previous_azimuth_deg,
@@ -114,12 +83,12 @@ impl SweepAssembler {
         });
         self.previous_azimuth_deg = azimuth_deg;
         if self.pending_columns() < MOST_COLUMNS {
-            for laser in LASER_BY_LAYER {
-                let channel = &channels[laser * CHANNEL_LEN..];
-                let units = u16::from_le_bytes([channel[0], channel[1]]);
-                let distance = ByteOrder::Big.split(units / UNITS_PER_CENTIMETRE);
-                self.distances.extend_from_slice(&distance);
-            }
+            let centimetres = distances.map(|units| units / UNITS_PER_CENTIMETRE);
+            self.distances.extend(
+                centimetres
+                    .into_iter()
+                    .flat_map(|distance| ByteOrder::Big.split(distance)),
+            );
         }
         closed
     }
@@ -134,26 +103,24 @@ fn on_circle(azimuth_deg: f32) -> f32 {
     }
 }
 
-fn azimuth_deg(block: &[u8]) -> f32 {
-    f32::from(u16::from_le_bytes([block[2], block[3]])) / 100.0
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wire::velodyne::data::{PacketWriter, Return, ReturnMode};
 
     fn packet(first_hundredths: u16) -> Vec<u8> {
-        let mut packet = vec![];
-        for block in 0..12u16 {
-            packet.extend(BLOCK_FLAG);
-            packet.extend(((first_hundredths + 40 * block) % 36_000).to_le_bytes());
-            for channel in 0..32u16 {
-                packet.extend((1000 + 5 * (channel % 16)).to_le_bytes());
-                packet.push(7);
+        let mut packet = PacketWriter::new(ReturnMode::Strongest, 0x22);
+        for block in 0..BLOCKS {
+            packet.set_azimuth(block, (first_hundredths + 40 * block as u16) % 36_000);
+            for channel in 0..2 * LASERS {
+                let found = Return {
+                    distance: 1000 + 5 * (channel % LASERS) as u16,
+                    reflectivity: 7,
+                };
+                packet.set(block, channel / LASERS, channel % LASERS, found);
             }
         }
-        packet.extend([0; 6]);
-        packet
+        packet.bytes().to_vec()
     }
 
     #[test]
@@ -184,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_data_packet_is_named() {
+    fn what_is_no_data_packet_is_passed_over() {
         let mut assembler = SweepAssembler::default();
         assert_eq!(
             assembler.take(&[0; 512]),
