@@ -132,6 +132,7 @@ impl Beams {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cloud::scan_through_a_pane;
     use crate::cloud::tests::{later, scan_of};
     use crate::cloud::{MAX_LAYERS, Scan};
     use crate::ego::Pose;
@@ -173,6 +174,20 @@ mod tests {
     fn seen(beams: &Beams, at_m: Vector3<f64>) -> Seen {
         let azimuth_rad = libm::atan2(at_m.x, at_m.y);
         beams.seen(0, &at_m, azimuth_rad, |_| false)
+    }
+
+    #[test]
+    fn between_two_returns_of_a_pulse_it_was_empty_and_at_both_occupied() {
+        let scan = scan_through_a_pane();
+        let mut beams = Beams::default();
+        let (sweep, columns) = (Sweep::still(0), scan.columns());
+        let placements = vec![Pose::SENSOR.placement(); columns];
+        beams.begin(&sweep);
+        beams.remember(&scan, &vec![false; scan.len()], &[], &sweep, &placements);
+        let at = |range_m: f64| seen(&beams, place(range_m, 15.0));
+        assert_eq!([2.0, 7.0].map(at), [Seen::Empty; 2]);
+        assert_eq!([4.0, 10.0].map(at), [Seen::Occupied; 2]);
+        assert_eq!(seen(&beams, place(11.0, 15.0)), Seen::Unknown);
     }
 
     #[test]

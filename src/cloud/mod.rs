@@ -20,6 +20,8 @@ mod refusal;
 mod scan;
 
 #[cfg(test)]
+pub(crate) use packets::tests::scan_through_a_pane;
+#[cfg(test)]
 pub(crate) use scan::tests;
 
 pub mod sensor;

@@ -147,12 +147,12 @@ impl Evidence {
         let returns_m = &self.returns_m[place];
         let (ends_m, runs) = (&self.ends_m[place], &self.runs[place]);
         let until_m = parameters.low_pass_m as f32 - self.sensor_m;
-        // A ray below an obstacle that higher rays met goes on under it.
+        // A ray below an obstacle that higher rays met goes on under it; what part of a pulse went through is no roof.
         let mut roofs_m = [parameters.reach_m as f32; MAX_LAYERS];
         for layer in (1..MAX_LAYERS).rev() {
             let is_obstacle = self.is_obstacle[place][layer];
             let own_m = if is_obstacle {
-                returns_m[layer]
+                greatest(returns_m[layer], ends_m[layer])
             } else {
                 NONE_M
             };
@@ -340,6 +340,7 @@ pub(super) fn stretches(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cloud::scan_through_a_pane;
     use crate::cloud::tests::scan_of;
     use crate::parameter::Profile;
 
@@ -349,6 +350,35 @@ mod tests {
         assert_eq!(around(true), [8, 9, 0, 9, 0, 1].map(Some));
         assert_eq!(around(false), [None, None, Some(0), Some(9), None, None]);
         assert_eq!([0, 2].map(|number| neighbour(number, 0, true)), [None; 2]);
+    }
+
+    #[test]
+    fn what_a_pulse_with_two_returns_passed_behind_the_first_is_free() {
+        let scan = scan_through_a_pane();
+        let plane = Plane::level(1.9);
+        let heights_m: Vec<f32> = scan.z_m().iter().map(|z| z + 1.9).collect();
+        let (mut evidence, mut passed) = (Evidence::default(), vec![]);
+        gather(
+            &mut evidence,
+            0..scan.columns(),
+            &scan,
+            &plane,
+            &vec![false; scan.len()],
+            &heights_m,
+            &GridParameters::profile(Profile::Default),
+        );
+        let nearest_m = |degrees: f64| {
+            let column = scan.column_at(degrees.to_radians());
+            evidence.nearest_m[BESIDE + column].round()
+        };
+        assert_eq!((nearest_m(15.0), nearest_m(30.0)), (4.0, 10.0));
+        stretches(&mut evidence, &GridParameters::profile(Profile::Default), &mut passed);
+        let column = scan.column_at(15f64.to_radians());
+        let behind = passed
+            .iter()
+            .filter(|stretch| stretch.column == column && stretch.to_m > 4.5)
+            .map(|stretch| (stretch.to_m - stretch.from_m).round());
+        assert_eq!(behind.collect::<Vec<_>>(), [5.0]);
     }
 
     #[test]

@@ -398,7 +398,7 @@ impl PacketIntake {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, OwnVehicle, Scan};
     use crate::parameter::Profile;
@@ -653,8 +653,7 @@ mod tests {
         );
     }
 
-    #[test]
-    fn the_nearer_of_two_returns_is_the_point_and_the_farther_the_reach() {
+    fn behind_a_pane() -> Listener {
         let sensor = TestSensor {
             mode: ReturnMode::Dual,
             ..SENSOR
@@ -663,6 +662,17 @@ mod tests {
         for number in 0..350 {
             listener.hear(&sensor, number).unwrap();
         }
+        listener
+    }
+
+    /// A revolution in a round room of 10 m, with a pane at 4 m from 10 to 20 degrees, of pulses with two returns.
+    pub(crate) fn scan_through_a_pane() -> Scan {
+        behind_a_pane().scan
+    }
+
+    #[test]
+    fn the_nearer_of_two_returns_is_the_point_and_the_farther_the_reach() {
+        let listener = behind_a_pane();
         assert!(matches!(listener.closed[1], Ok((1808..=1809, 0, false))));
         let scan = &listener.scan;
         let at = |azimuth_deg: f64| {
