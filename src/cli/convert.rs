@@ -24,7 +24,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let bytes = files::read(&arguments.input)?;
-    files::check_distinct(&arguments.input, &[Some(&arguments.output)])?;
+    files::check_distinct(&[Some(&arguments.input)], &[Some(&arguments.output)])?;
     let capture = Capture::read(&arguments.input, &bytes)?;
     let clouds = capture.clouds(arguments.id);
     let mut output = Output::create(&arguments.output)?;

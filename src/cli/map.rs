@@ -1,7 +1,5 @@
 //! `grid.npz`: a map as an array for numpy.
 
-use std::path::Path;
-
 use anyhow::Result;
 
 use super::npz::Archive;
@@ -11,8 +9,7 @@ use crate::simulate::map::TrueMap;
 
 /// Writes a true map: `cells[rows][columns]` from the south-west, bits of
 /// [`crate::simulate::map::cell`].
-pub(super) fn write_truth(path: &Path, map: &TrueMap) -> Result<()> {
-    let mut archive = Archive::create(path)?;
+pub(super) fn write_truth(mut archive: Archive, map: &TrueMap) -> Result<()> {
     archive.put("cells", &map.shape, map.cells.iter().copied())?;
     archive.put("origin", &[2], map.origin_m.into_iter())?;
     archive.put("cell", &[], std::iter::once(map.cell_m))?;
@@ -21,7 +18,7 @@ pub(super) fn write_truth(path: &Path, map: &TrueMap) -> Result<()> {
 
 /// Writes the map as it is: `probability[rows][columns]` from the south-west, 0.5 unknown,
 /// `origin` of that corner in the local frame, and the `cell` size.
-pub(super) fn write(path: &Path, grid: &Grid) -> Result<()> {
+pub(super) fn write(mut archive: Archive, grid: &Grid) -> Result<()> {
     let cell_m = grid.cell_m();
     let anchor = grid.anchor();
     let covered = |tile: &Tile| covered(tile, &anchor, cell_m);
@@ -45,7 +42,6 @@ pub(super) fn write(path: &Path, grid: &Grid) -> Result<()> {
     let probability = log_odds
         .into_iter()
         .map(|cell| model::probability(f64::from(cell) / model::UNITS) as f32);
-    let mut archive = Archive::create(path)?;
     archive.put("probability", &[rows, columns], probability)?;
     let origin_m = low.into_iter().map(|cell| cell as f64 * cell_m);
     archive.put("origin", &[2], origin_m)?;

@@ -1,7 +1,6 @@
 //! Archives of arrays for numpy.
 
-use std::fs::File;
-use std::io::{BufWriter, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
@@ -14,7 +13,7 @@ use super::files::Output;
 #[derive(Debug)]
 pub(super) struct Archive {
     path: PathBuf,
-    zip: ZipWriter<BufWriter<File>>,
+    zip: ZipWriter<Output>,
 }
 
 /// A number as numpy names it.
@@ -45,10 +44,9 @@ elements! {
 
 impl Archive {
     pub(super) fn create(path: &Path) -> Result<Self> {
-        let file = Output::create(path)?.into_file()?;
         Ok(Self {
             path: path.into(),
-            zip: ZipWriter::new(BufWriter::new(file)),
+            zip: ZipWriter::new(Output::create(path)?),
         })
     }
 
@@ -72,10 +70,9 @@ impl Archive {
     }
 
     pub(super) fn finish(self) -> Result<()> {
-        let finished = self.zip.finish().map_err(std::io::Error::from);
-        finished
-            .and_then(|mut writer| writer.flush())
-            .with_context(|| self.path.display().to_string())
+        let finished = self.zip.finish();
+        let output = finished.with_context(|| self.path.display().to_string())?;
+        output.finish()
     }
 }
 

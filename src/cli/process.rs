@@ -7,6 +7,7 @@ use clap::Args;
 
 use super::files::Output;
 use super::labels::LabelWriter;
+use super::npz::Archive;
 use super::score::Score;
 use super::summary::Summary;
 use super::{Completion, files, map, objects};
@@ -61,6 +62,7 @@ struct Process<'a> {
     objects: Option<Output>,
     trajectory: Option<Output>,
     labels: Option<LabelWriter>,
+    grid: Option<Archive>,
     score: Option<Score>,
     summary: Option<Summary>,
     frame: Vec<u8>,
@@ -79,10 +81,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
         &arguments.grid,
         &arguments.trajectory,
     ];
-    files::check_distinct(&arguments.input, &outputs.map(Option::as_ref))?;
-    if let Some(truth) = &arguments.truth {
-        files::check_distinct(truth, &outputs.map(Option::as_ref))?;
-    }
+    let inputs = [
+        Some(&arguments.input),
+        arguments.truth.as_ref(),
+        arguments.config.as_ref(),
+    ];
+    files::check_distinct(&inputs, &outputs.map(Option::as_ref))?;
     let asks_nothing = arguments.truth.is_none() && outputs.iter().all(|output| output.is_none());
     let mut process = Process {
         arguments,
@@ -96,6 +100,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
             .as_deref()
             .map(LabelWriter::create)
             .transpose()?,
+        grid: arguments.grid.as_deref().map(Archive::create).transpose()?,
         summary: asks_nothing.then(Summary::new),
         frame: vec![],
         status_due: None,
@@ -207,8 +212,8 @@ impl Process<'_> {
         if let Some(labels) = self.labels {
             labels.finish()?;
         }
-        if let Some(path) = &self.arguments.grid {
-            map::write(path, self.pipeline.grid())?;
+        if let Some(archive) = self.grid {
+            map::write(archive, self.pipeline.grid())?;
         }
         let (status, counts) = (self.pipeline.status(), self.pipeline.counts());
         say!(

@@ -7,8 +7,9 @@ use anyhow::Result;
 use clap::Args;
 use tokio::time::{Instant, sleep_until};
 
-use super::files::{Output, progress};
+use super::files::{Output, check_distinct, progress};
 use super::labels::LabelWriter;
+use super::npz::Archive;
 use super::pcap::PcapWriter;
 use super::{Completion, map, objects};
 use crate::daemon::session::Sender;
@@ -103,6 +104,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let (Some(scenario), Some(path)) = (&arguments.scenario, &arguments.output) else {
         return Ok(Completion::Done);
     };
+    let outputs = [
+        Some(path),
+        arguments.truth.as_ref(),
+        arguments.labels.as_ref(),
+        arguments.grid.as_ref(),
+    ];
+    check_distinct(&[], &outputs)?;
     let in_packets = path
         .extension()
         .is_some_and(|extension| extension == "pcap");
@@ -116,6 +124,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
         .as_deref()
         .map(LabelWriter::create)
         .transpose()?;
+    let grid = arguments.grid.as_deref();
+    let grid = grid.map(Archive::create).transpose()?;
     let revolutions = (arguments.duration * ROTATION_HZ).round().max(1.0) as usize;
     let bar = progress(revolutions, "revolutions");
     let mut simulation = match in_packets {
@@ -139,8 +149,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     sink.finish(&mut simulation)?;
     truth.map_or(Ok(()), Output::finish)?;
     labels.map_or(Ok(()), LabelWriter::finish)?;
-    if let (Some(path), Some(map)) = (&arguments.grid, simulation.map()) {
-        map::write_truth(path, &map)?;
+    if let (Some(archive), Some(map)) = (grid, simulation.map()) {
+        map::write_truth(archive, &map)?;
     }
     Ok(Completion::Done)
 }

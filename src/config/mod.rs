@@ -8,7 +8,7 @@ use crate::cluster::ClusterParameters;
 use crate::ego::EgoParameters;
 use crate::grid::GridParameters;
 use crate::ground::GroundParameters;
-use crate::parameter::{Profile, Section, parameters};
+use crate::parameter::{Profile, Section, Value, parameters};
 use crate::publish::PublishParameters;
 use crate::track::TrackParameters;
 
@@ -50,7 +50,46 @@ pub struct Configuration {
     pub session: SessionParameters,
 }
 
+/// Pairs of parameters, as section and name, of which the first may not be above the second.
+pub const RELATIONS: [[&str; 2]; 14] = [
+    ["cloud.minimum_range_m", "cloud.maximum_range_m"],
+    ["cloud.vehicle_x_low_m", "cloud.vehicle_x_high_m"],
+    ["cloud.vehicle_y_low_m", "cloud.vehicle_y_high_m"],
+    ["cloud.vehicle_z_low_m", "cloud.vehicle_z_high_m"],
+    ["ground.height_low_m", "ground.height_high_m"],
+    ["cluster.min_points_far", "cluster.min_points"],
+    ["track.lowest_object_m", "track.highest_object_m"],
+    ["track.lowest_object_m", "cluster.highest_m"],
+    ["grid.obstacle_low_m", "grid.obstacle_high_m"],
+    ["grid.low_pass_m", "grid.obstacle_high_m"],
+    ["grid.cell_m", "grid.reach_m"],
+    ["grid.nearest_m", "grid.reach_m"],
+    ["grid.reach_m", "grid.keep_m"],
+    ["grid.lowest_probability", "grid.highest_probability"],
+];
+
+/// Most memory that a map may take, in megabytes.
+pub const MOST_MAP_MB: f64 = 2000.0;
+
 impl Configuration {
+    /// The value of a parameter by section and name, as in [`RELATIONS`].
+    pub fn value(&self, name: &str) -> Option<Value> {
+        let (section, key) = name.split_once('.')?;
+        let sections = self.sections();
+        let section = sections.iter().find(|found| found.name() == section)?;
+        let descriptions = section.descriptions();
+        let index = descriptions.iter().position(|found| found.key == key)?;
+        Some(section.get(index))
+    }
+
+    /// The first pair of [`RELATIONS`] that does not hold.
+    pub fn contradiction(&self) -> Option<[&'static str; 2]> {
+        RELATIONS.into_iter().find(|names| {
+            let [low, high] = names.map(|name| self.value(name).and_then(|value| value.number()));
+            low > high
+        })
+    }
+
     /// A built-in profile.
     pub fn profile(profile: Profile) -> Self {
         Self {
@@ -108,7 +147,6 @@ impl Default for Configuration {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameter::Value;
 
     #[test]
     fn both_profiles_lie_within_every_range() {
@@ -122,6 +160,19 @@ mod tests {
                 }
             }
             assert_eq!(configuration, Configuration::profile(profile));
+        }
+    }
+
+    #[test]
+    fn relations_are_between_numbers_and_hold_in_both_profiles() {
+        for profile in [Profile::Default, Profile::Thesis] {
+            let configuration = Configuration::profile(profile);
+            for name in RELATIONS.as_flattened() {
+                let value = configuration.value(name);
+                assert!(value.and_then(|value| value.number()).is_some(), "{name}");
+            }
+            assert_eq!(configuration.contradiction(), None);
+            assert!(configuration.grid.most_mb() < MOST_MAP_MB);
         }
     }
 

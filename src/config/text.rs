@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use toml::de::{DeTable, DeValue};
 
-use super::Configuration;
-use crate::parameter::{Problem, Profile, Section, Value};
+use super::{Configuration, MOST_MAP_MB};
+use crate::parameter::{Problem, Profile, Value};
 
 /// What is wrong with a configuration file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -38,21 +38,33 @@ pub enum ConfigError {
         /// What was given a value.
         name: String,
     },
-    /// A lower bound above its upper one.
-    #[error("line {line}: {section}.{low_key} = {low} is above {section}.{high_key} = {high}")]
+    /// A value above another one that it may not exceed.
+    #[error("line {line}: {low_name} = {low} is above {high_name} = {high}")]
     Contradiction {
         /// Counted from 1; of the later one of the two.
         line: usize,
-        /// Section of both.
-        section: &'static str,
-        /// Name of the lower bound.
-        low_key: &'static str,
+        /// Section and name of the one.
+        low_name: &'static str,
         /// Its value.
         low: Value,
-        /// Name of the upper bound.
-        high_key: &'static str,
+        /// Section and name of the other.
+        high_name: &'static str,
         /// Its value.
         high: Value,
+    },
+    /// A map that no computer should keep.
+    #[error(
+        "line {line}: a map with grid.cell_m = {cell_m} and grid.keep_m = {keep_m} takes up to {mb:.0} MB, at most {MOST_MAP_MB} are allowed"
+    )]
+    TooLarge {
+        /// Counted from 1; of the later one of the two.
+        line: usize,
+        /// Side of a cell.
+        cell_m: f64,
+        /// How far it is kept.
+        keep_m: f64,
+        /// What it takes.
+        mb: f64,
     },
     /// A value that cannot be.
     #[error("line {line}: {section}.{key}: {problem}")]
@@ -117,6 +129,7 @@ pub fn parse(text: &str) -> Result<Configuration, ConfigError> {
             read_section(text, &mut configuration, line, name, content.get_ref())?;
         }
     }
+    check(text, document.get_ref(), &configuration)?;
     Ok(configuration)
 }
 
@@ -190,49 +203,47 @@ fn read_section(
                 problem,
             })?;
     }
-    let last_line = |keys: [&str; 2]| {
-        let given = keys.into_iter().filter_map(|key| table.get_key_value(key));
-        given
-            .map(|(key, _)| line_of(text, key.span().start))
-            .max()
-            .unwrap_or(line)
-    };
-    match inverted_bounds(section) {
-        None => Ok(()),
-        Some([low, high]) => Err(ConfigError::Contradiction {
-            line: last_line([descriptions[low].key, descriptions[high].key]),
-            section: section.name(),
-            low_key: descriptions[low].key,
-            low: section.get(low),
-            high_key: descriptions[high].key,
-            high: section.get(high),
-        }),
-    }
+    Ok(())
 }
 
-/// Two parameters of which one is called low or minimum and the other high or maximum, and the
-/// same otherwise, whose values are the wrong way round.
-fn inverted_bounds(section: &dyn Section) -> Option<[usize; 2]> {
-    let descriptions = section.descriptions();
-    let number = |index| match section.get(index) {
-        Value::Real(value) => value,
-        Value::Integer(value) => value as f64,
-        Value::Bool(_) | Value::Text(_) => f64::NAN,
+/// Checks what parameters ask of each other.
+fn check(
+    text: &str,
+    document: &DeTable<'_>,
+    configuration: &Configuration,
+) -> Result<(), ConfigError> {
+    // A profile holds: at least one of two that do not is given.
+    let line = |names: [&str; 2]| {
+        let given = names.iter().filter_map(|name| {
+            let (section, key) = name.split_once('.')?;
+            let DeValue::Table(table) = document.get(section)?.get_ref() else {
+                return None;
+            };
+            let (key, _) = table.get_key_value(key)?;
+            Some(line_of(text, key.span().start))
+        });
+        given.max().unwrap_or(1)
     };
-    descriptions
-        .iter()
-        .enumerate()
-        .find_map(|(low, parameter)| {
-            let upper = parameter
-                .key
-                .replace("_low_", "_high_")
-                .replace("minimum_", "maximum_");
-            let high = descriptions
-                .iter()
-                .position(|other| other.key == upper)
-                .filter(|high| *high != low)?;
-            (number(low) > number(high)).then_some([low, high])
-        })
+    let value = |name| configuration.value(name).unwrap_or(Value::Bool(false));
+    if let Some([low, high]) = configuration.contradiction() {
+        return Err(ConfigError::Contradiction {
+            line: line([low, high]),
+            low_name: low,
+            low: value(low),
+            high_name: high,
+            high: value(high),
+        });
+    }
+    let grid = &configuration.grid;
+    if grid.most_mb() > MOST_MAP_MB {
+        return Err(ConfigError::TooLarge {
+            line: line(["grid.cell_m", "grid.keep_m"]),
+            cell_m: grid.cell_m,
+            keep_m: grid.keep_m,
+            mb: grid.most_mb(),
+        });
+    }
+    Ok(())
 }
 
 /// A TOML value in our terms; what no parameter can be becomes a word that says so.
@@ -319,6 +330,29 @@ mod tests {
         assert_eq!(
             error.to_string(),
             "line 3: cloud.minimum_range_m = 3.0 is above cloud.maximum_range_m = 2.0"
+        );
+    }
+
+    #[test]
+    fn values_of_different_sections_that_contradict_each_other_are_named_both() {
+        let error = parse("[cluster]\nhighest_m = 1\n[track]\nlowest_object_m = 2\n").unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "line 4: track.lowest_object_m = 2.0 is above cluster.highest_m = 1.0"
+        );
+        let error = parse("[grid]\nkeep_m = 40.0\n").unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "line 2: grid.reach_m = 50.0 is above grid.keep_m = 40.0"
+        );
+    }
+
+    #[test]
+    fn a_map_that_is_too_large_is_refused() {
+        let error = parse("[grid]\ncell_m = 0.05\nkeep_m = 1000\n").unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "line 3: a map with grid.cell_m = 0.05 and grid.keep_m = 1000 takes up to 4800 MB, at most 2000 are allowed"
         );
     }
 

@@ -65,7 +65,8 @@ parameters! {
         /// Horizontal distance from the sensor up to which cells are updated. Cost grows with
         /// its square.
         reach_m: f64 = 50.0, thesis 10.0, in 1.0..=120.0, "m";
-        /// Distance from the sensor beyond which the map is forgotten. A cell takes three bytes.
+        /// Distance from the sensor beyond which the map is forgotten. A cell takes three bytes: within 200 m cells of 0.1 m
+        /// take up to 48 MB; more than 2 GB are refused.
         keep_m: f64 = 200.0, in 5.0..=1000.0, "m";
         /// In how many revolutions all around the sensor is taken in, a part of the circle in each:
         /// what stands need not be looked at every time. A map that has just begun takes all in.
@@ -112,6 +113,15 @@ parameters! {
         /// A tile whose datagram would be longer is sent with three levels of occupancy
         /// instead of fifteen, and in any case whole.
         tile_bytes: usize = 1400, in 200..=65000, "bytes";
+    }
+}
+
+impl GridParameters {
+    /// What a map takes at most, in megabytes.
+    pub fn most_mb(&self) -> f64 {
+        const CELL_BYTES: f64 = 3.0;
+        let side = 2.0 * self.keep_m / self.cell_m;
+        1e-6 * CELL_BYTES * side * side
     }
 }
 

@@ -57,6 +57,12 @@ pub struct Envelope<'a> {
     pub sender_stamp: u32,
 }
 
+/// Fields that an envelope may have: six, some that a later schema adds, and repetitions. It bounds what looking for the
+/// next sound frame in a damaged recording costs, where every second byte may seem to begin one.
+const MOST_FIELDS: usize = 32;
+/// Bytes that a time in an envelope may have: 22, and some that a later schema adds.
+const MOST_TIME_BYTES: usize = 64;
+
 impl<'a> Envelope<'a> {
     /// Decodes the body of a frame that begins at `base`.
     ///
@@ -64,9 +70,16 @@ impl<'a> Envelope<'a> {
     /// [`WireError`] with the offset of the first byte that does not fit.
     pub fn decode(body: &'a [u8], base: usize) -> Result<Self, WireError> {
         let mut envelope = Self::default();
-        let mut reader = Reader::new(body, base);
+        let mut reader = Reader::bounded(body, base, MOST_FIELDS);
         while let Some(field) = reader.next_field()? {
             let end = reader.offset();
+            let is_long_time = match (field.id, field.value) {
+                (3..=5, Value::Bytes(bytes)) => bytes.len() > MOST_TIME_BYTES,
+                _ => false,
+            };
+            if is_long_time {
+                return Err(WireError::TooManyFields { offset: end });
+            }
             match (field.id, field.value) {
                 (1, Value::Varint(raw)) => envelope.data_type = protobuf::unzigzag(raw) as i32,
                 (2, Value::Bytes(bytes)) => {
@@ -166,6 +179,21 @@ mod tests {
         .put(&mut out, &message);
         let hex: String = out.iter().map(|byte| format!("{byte:02x}")).collect();
         assert_eq!(hex, expected);
+    }
+
+    #[test]
+    fn an_envelope_of_endless_fields_is_refused() {
+        let decode = |fields: usize| {
+            let body = [0x30, 7].repeat(fields);
+            Envelope::decode(&body, 0).map(|envelope| envelope.sender_stamp)
+        };
+        assert_eq!(decode(MOST_FIELDS), Ok(7));
+        let refused = Err(WireError::TooManyFields { offset: 64 });
+        assert_eq!(decode(MOST_FIELDS + 1), refused);
+        let empty = Envelope::decode(&[0x0f; 40], 0);
+        assert_eq!(empty, Err(WireError::TooManyFields { offset: 32 }));
+        let long_time = [&[0x1a, 66][..], &[0x08, 7].repeat(33)].concat();
+        assert!(Envelope::decode(&long_time, 0).is_err());
     }
 
     #[test]

@@ -106,6 +106,12 @@ pub enum WireError {
         /// Where the varint begins.
         offset: usize,
     },
+    /// An envelope, or a time in one, has more fields than any peer's.
+    #[error("byte {offset}: more fields than an envelope can have")]
+    TooManyFields {
+        /// Where the first one too many begins.
+        offset: usize,
+    },
     /// A field's length points past the end of its message.
     #[error("byte {offset}: a field announces {length} bytes, {available} are there")]
     LengthBeyondEnd {
@@ -126,6 +132,7 @@ impl WireError {
             Self::FrameTruncated { .. } => "frame_truncated",
             Self::Truncated { .. } => "number_truncated",
             Self::VarintTooLong { .. } => "varint_too_long",
+            Self::TooManyFields { .. } => "too_many_fields",
             Self::LengthBeyondEnd { .. } => "length_beyond_end",
         }
     }
@@ -137,6 +144,7 @@ impl WireError {
             | Self::FrameTruncated { offset, .. }
             | Self::Truncated { offset }
             | Self::VarintTooLong { offset }
+            | Self::TooManyFields { offset }
             | Self::LengthBeyondEnd { offset, .. } => *offset,
         }
     }

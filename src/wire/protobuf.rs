@@ -33,6 +33,8 @@ pub struct Reader<'a> {
     bytes: &'a [u8],
     position: usize,
     base: usize,
+    /// Keys that may still come.
+    keys: usize,
 }
 
 impl<'a> Reader<'a> {
@@ -42,6 +44,15 @@ impl<'a> Reader<'a> {
             bytes,
             position: 0,
             base,
+            keys: usize::MAX,
+        }
+    }
+
+    /// The same of a message that has no more keys than this.
+    pub fn bounded(bytes: &'a [u8], base: usize, keys: usize) -> Self {
+        Self {
+            keys,
+            ..Self::new(bytes, base)
         }
     }
 
@@ -60,10 +71,14 @@ impl<'a> Reader<'a> {
     /// Wire types 3, 4, 6 and 7 have no content here: their key is passed over, as both peers do.
     ///
     /// # Errors
-    /// [`WireError`] with the offset when a varint or a length does not fit the bytes.
+    /// [`WireError`] with the offset when a varint or a length does not fit the bytes, or there are too many keys.
     pub fn next_field(&mut self) -> Result<Option<Field<'a>>, WireError> {
         while !self.is_empty() {
             let offset = self.offset();
+            self.keys = self
+                .keys
+                .checked_sub(1)
+                .ok_or(WireError::TooManyFields { offset })?;
             let key = self.varint()?;
             let value = match key & 7 {
                 0 => Value::Varint(self.varint()?),
