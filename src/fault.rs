@@ -18,6 +18,34 @@ pub enum Fault {
     /// A point cloud that is no whole revolution, or that the array cannot hold.
     #[error("point cloud refused: {0}")]
     Refused(#[from] Refusal),
+    /// A pose of a receiver that knows no place.
+    #[error(
+        "message {data_type}: a place at 0 degrees north and east is that of a receiver without a fix"
+    )]
+    NoFix {
+        /// The envelope's data type.
+        data_type: i32,
+    },
+    /// A pose of another sender than the one that is listened to.
+    #[error(
+        "message {data_type}: from sender {sender_stamp}, while sender {listened} is listened to"
+    )]
+    OtherPoseSender {
+        /// The envelope's data type.
+        data_type: i32,
+        /// Who sent it.
+        sender_stamp: u32,
+        /// Who is listened to.
+        listened: u32,
+    },
+    /// A pose whose time has nothing to do with that of the revolutions.
+    #[error("message {data_type}: stamped {behind_s:.1} s behind the revolutions: not used")]
+    PoseClock {
+        /// The envelope's data type.
+        data_type: i32,
+        /// How far.
+        behind_s: f64,
+    },
     /// A packet of a sensor that is of no use.
     #[error(transparent)]
     Packet(#[from] PacketRefusal),
@@ -35,6 +63,9 @@ impl Fault {
         match self {
             Self::Damaged { error, .. } => error.name(),
             Self::Refused(refusal) => refusal.name(),
+            Self::NoFix { .. } => "pose_without_fix",
+            Self::OtherPoseSender { .. } => "pose_other_sender",
+            Self::PoseClock { .. } => "pose_clock",
             Self::Packet(refusal) => refusal.name(),
             Self::ImplausiblePose { .. } => "pose_implausible",
         }
@@ -58,6 +89,8 @@ pub struct Counts {
     pub damaged: u64,
     /// Poses read.
     pub poses: u64,
+    /// Sound poses that are of no use: of other senders, other clocks, or without a fix.
+    pub poses_refused: u64,
     /// Revolutions that kept the last good plane.
     pub ground_held: u64,
     /// Revolutions at the configured height.

@@ -122,6 +122,9 @@ impl Pipeline {
             Fault::Refused(_) => self.counts.refused += 1,
             Fault::Packet(refusal) => self.counts.damaged += u64::from(refusal.is_damage()),
             Fault::Damaged { .. } | Fault::ImplausiblePose { .. } => self.counts.damaged += 1,
+            Fault::NoFix { .. } | Fault::OtherPoseSender { .. } | Fault::PoseClock { .. } => {
+                self.counts.poses_refused += 1;
+            }
         }
     }
 
@@ -198,6 +201,21 @@ impl Pipeline {
             Heard::Nothing => Ok(Outcome::Other),
             Heard::Implausible => Err(Fault::ImplausiblePose {
                 data_type: envelope.data_type,
+            }),
+            Heard::NoFix => Err(Fault::NoFix {
+                data_type: envelope.data_type,
+            }),
+            Heard::OtherSender {
+                sender_stamp,
+                listened,
+            } => Err(Fault::OtherPoseSender {
+                data_type: envelope.data_type,
+                sender_stamp,
+                listened,
+            }),
+            Heard::OtherClock { behind } => Err(Fault::PoseClock {
+                data_type: envelope.data_type,
+                behind_s: behind.seconds(),
             }),
             Heard::Pose => {
                 self.counts.poses += 1;
@@ -437,6 +455,8 @@ impl Pipeline {
             status.pose_source = last.ego.source.into();
             status.pose_disagreement = last.ego.disagreement_m as f32;
             status.pose_jumps = last.ego.jumps;
+            status.pose_clock_behind = last.ego.behind_s as f32;
+            status.pose_distrusted = last.ego.distrusted.unwrap_or_default().into();
         }
         if let Some(mode) = self.packets.mode() {
             status.return_mode = mode.name().into();

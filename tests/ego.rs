@@ -30,11 +30,15 @@ fn at(seconds: f64) -> Time {
 }
 
 fn hear(ego: &mut Ego, seconds: f64, message: &impl Message) -> Heard {
+    hear_from(ego, 0, seconds, message)
+}
+
+fn hear_from(ego: &mut Ego, sender_stamp: u32, seconds: f64, message: &impl Message) -> Heard {
     let mut frame = vec![];
     let postmark = Postmark {
         sent: at(seconds),
         sampled: at(seconds),
-        sender_stamp: 0,
+        sender_stamp,
     };
     postmark.put(&mut frame, message);
     let (envelope, _) = Envelope::from_datagram(&frame).unwrap();
@@ -248,6 +252,65 @@ fn what_is_no_pose_on_the_earth_is_refused() {
         assert_eq!(hear(&mut ego, 0.0, message), Heard::Implausible);
     }
     assert_eq!(sweep(&mut ego, 0.0).vehicle, None);
+}
+
+#[test]
+fn a_receiver_without_a_fix_is_refused_and_ties_the_frame_to_nothing() {
+    let mut ego = ego();
+    let nowhere = ApplanixGroup1 {
+        lat: 0.0,
+        lon: 0.0,
+        ..fix(0.0, 0.0, 0.0)
+    };
+    assert_eq!(hear(&mut ego, 0.0, &nowhere), Heard::NoFix);
+    assert_eq!(hear(&mut ego, 0.1, &fix(7.0, 0.0, 0.0)), Heard::Pose);
+    let place_m = sweep(&mut ego, 0.1).vehicle.unwrap().position_m;
+    assert_eq!(place_m, [0.0; 3]);
+}
+
+#[test]
+fn a_second_sender_of_poses_is_told_and_changes_nothing() {
+    let mut ego = ego();
+    for step in 0..300 {
+        let seconds = 0.01 * f64::from(step);
+        assert_eq!(
+            hear(&mut ego, seconds, &fix(seconds, 0.0, 90.0)),
+            Heard::Pose
+        );
+        let beside = fix(seconds + 1.2, 0.0, 90.0);
+        let expected = Heard::OtherSender {
+            sender_stamp: 2,
+            listened: 0,
+        };
+        assert_eq!(hear_from(&mut ego, 2, seconds, &beside), expected);
+    }
+    let place_m = sweep(&mut ego, 2.99).vehicle.unwrap().position_m;
+    assert!((place_m[0] - 2.99).abs() < 1e-3, "{place_m:?}");
+}
+
+#[test]
+fn a_clock_that_is_steadily_behind_is_made_up_for_and_another_one_is_told() {
+    let mut late = ego();
+    let mut other = ego();
+    let mut told = 0;
+    for step in 0..300 {
+        let seconds = 0.01 * f64::from(step);
+        let message = fix(seconds, 0.0, 90.0);
+        hear(&mut late, seconds - 0.8, &message);
+        let heard = hear(&mut other, seconds - 3600.0, &message);
+        told += u32::from(matches!(heard, Heard::OtherClock { .. }));
+        if step % 10 == 9 {
+            let vehicle = sweep(&mut late, seconds).vehicle.expect("a pose");
+            // Poses are as old as their clock says, give or take the time from one to the next.
+            assert!(
+                (vehicle.position_m[0] - seconds).abs() < 0.02,
+                "{vehicle:?}"
+            );
+            assert_eq!(sweep(&mut other, seconds).vehicle, None);
+        }
+    }
+    assert!((late.report().behind_s - 0.8).abs() < 0.02);
+    assert!(told > 280, "{told}");
 }
 
 #[test]

@@ -147,7 +147,8 @@ impl Session {
         let counts: &Counts = self.pipeline.counts();
         let faults: BTreeMap<_, _> = counts.faults.iter().collect();
         assert_eq!(faults, self.faults);
-        assert_eq!(counts.faults.total(), counts.refused + counts.damaged);
+        let counted = counts.refused + counts.damaged + counts.poses_refused;
+        assert_eq!(counts.faults.total(), counted);
         assert_eq!(
             (counts.revolutions, counts.poses),
             (self.clouds, self.poses)

@@ -361,6 +361,18 @@ impl<'a> Worker<'a> {
                     format!("{source} jumped: the local frame is tied to the odometry anew")
                 });
             }
+            let is_behind = |ego: &EgoReport| ego.behind_s != 0.0;
+            if !is_behind(&last) && is_behind(&report.ego) {
+                let behind_s = report.ego.behind_s;
+                self.log.note("pose_behind", || {
+                    format!("poses are stamped {behind_s:.2} s behind the revolutions, which is made up for")
+                });
+            }
+            if let Some(name) = report.ego.distrusted.filter(|_| last.distrusted.is_none()) {
+                self.log.note("pose_disagrees", || {
+                    format!("{name} does not go as the sensor does: it is not used")
+                });
+            }
             if last.restarts != report.ego.restarts {
                 self.log.note("odometry_restart", || {
                     "what is seen did not fit for too long: a new map begins".into()

@@ -1,7 +1,10 @@
 //! Values over time: between two of them, a little beyond the last, and no farther.
 
+use super::lag::{Clock, Lag};
 use crate::time::{Span, Time};
 
+/// Values nearer to the last one than this add nothing: no source of poses sends 500 a second, and a flood costs no more.
+const NEAREST: Span = Span::from_micros(2_000);
 /// How much is kept: more than two revolutions at 5 Hz.
 const KEPT: Span = Span::from_micros(1_000_000);
 /// Two values this far apart show how it goes on; nearer ones show their noise.
@@ -23,11 +26,15 @@ impl Blend for f64 {
 #[derive(Debug, Clone)]
 pub(super) struct History<T> {
     values: Vec<(Time, T)>,
+    lag: Lag,
 }
 
 impl<T> Default for History<T> {
     fn default() -> Self {
-        Self { values: vec![] }
+        Self {
+            values: vec![],
+            lag: Lag::default(),
+        }
     }
 }
 
@@ -42,7 +49,7 @@ impl<T: Blend> History<T> {
         if let Some((last, _)) = self.values.last() {
             if (*last - time) > KEPT {
                 self.values.clear();
-            } else if time <= *last {
+            } else if time <= *last + NEAREST {
                 return;
             }
         }
@@ -54,6 +61,22 @@ impl<T: Blend> History<T> {
             .take_while(|entry| too_old(entry))
             .count();
         self.values.drain(..old);
+    }
+
+    /// Notes at the end of a revolution how far its clock is behind.
+    pub(super) fn note_lag(&mut self, end: Time) {
+        let newest = self.last().map(|(newest, _)| newest);
+        self.lag.note(newest, end);
+    }
+
+    /// The clock that stamps the values.
+    pub(super) fn clock(&self) -> Clock {
+        self.lag.clock()
+    }
+
+    /// The value at a time of the revolutions' clock.
+    pub(super) fn at_end(&self, time: Time, limit: Span) -> Option<T> {
+        self.at(self.lag.by_its_clock(time), limit)
     }
 
     pub(super) fn last(&self) -> Option<(Time, T)> {
@@ -127,6 +150,16 @@ mod tests {
         let beyond = history.at(at(700), LIMIT).unwrap();
         assert!((beyond - 7.0).abs() < 1e-9);
         assert_eq!(history.at(at(1001), LIMIT), None);
+    }
+
+    #[test]
+    fn a_flood_of_values_is_thinned() {
+        let mut history = History::default();
+        for step in 0..100_000 {
+            history.push(Time::from_micros(10 * step), step as f64);
+        }
+        assert!(history.values.len() <= 501);
+        assert!((history.at(at(900), LIMIT).unwrap() - 90_000.0).abs() < 1.0);
     }
 
     #[test]

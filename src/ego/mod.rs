@@ -1,7 +1,8 @@
 //! Where the vehicle is: in a frame that never jumps, by odometry, and in the world, by what the session says.
 //!
 //! `reading` brings every pose message to one set of units, `geodesy` WGS84 to the local frame,
-//! `history` reads between and beyond what was heard, `sources` chooses among them, `rates` learns what speeds mean. The odometry frame is tied to
+//! `history` reads between and beyond what was heard and `lag` follows its clock, `senders` says whom to listen to, `sources`
+//! chooses among them and `trust` says whether one goes as the sensor does, `rates` learns what speeds mean. The odometry frame is tied to
 //! the local frame by an `anchor` (the frames `odom` and `map` of ROS REP 105). `sweep` is the answer.
 
 mod anchor;
@@ -10,15 +11,21 @@ pub mod geodesy;
 
 mod history;
 
+mod lag;
+
 mod pose;
 
 mod rates;
 
 mod reading;
 
+mod senders;
+
 mod sources;
 
 mod sweep;
+
+mod trust;
 
 pub use anchor::Anchor;
 pub use pose::{Placement, Pose, wrapped_rad};
@@ -26,7 +33,7 @@ pub use sweep::{Frame, Sweep};
 
 use crate::cloud::Scan;
 use crate::geometry::{Outline, Rectangle};
-use crate::odometry::{Odometry, OdometryReport};
+use crate::odometry::{Odometry, OdometryReport, Quality};
 use crate::parameter::{choices, parameters};
 use crate::time::{Span, Time};
 use crate::wire::{Envelope, WireError};
@@ -98,6 +105,20 @@ pub enum Heard {
     Pose,
     /// Its numbers cannot be a vehicle's.
     Implausible,
+    /// It is that of a receiver that knows no place: 0 degrees north and east.
+    NoFix,
+    /// Another sender is listened to.
+    OtherSender {
+        /// Who sent it.
+        sender_stamp: u32,
+        /// Who is listened to.
+        listened: u32,
+    },
+    /// Its clock is so far from that of the revolutions that it is of no use.
+    OtherClock {
+        /// How far it is behind.
+        behind: Span,
+    },
 }
 
 /// The ego step: hears poses, follows the sensor, tells where it was.
@@ -133,6 +154,10 @@ pub struct EgoReport {
     pub disagreement_m: f64,
     /// How often a source jumped and stayed there.
     pub jumps: u64,
+    /// How far the clock of the poses in use is behind that of the revolutions, seconds; 0 if it is the same.
+    pub behind_s: f64,
+    /// A source that does not go as the sensor does, and is not used.
+    pub distrusted: Option<&'static str>,
 }
 
 /// Age of the odometry frame up to which it begins anew, along the axes of the local frame, when a first pose comes.
@@ -192,6 +217,10 @@ impl Ego {
             source: self.source.map_or("none", Source::name),
             disagreement_m: anchoring.map_or(0.0, Anchoring::off_m),
             jumps: self.past_jumps + jumps,
+            behind_s: self
+                .source
+                .map_or(0.0, |source| self.sources.behind_s(source)),
+            distrusted: self.sources.distrusted().map(Source::name),
         }
     }
 
@@ -216,6 +245,7 @@ impl Ego {
     pub fn follow(&mut self, scan: &Scan, moving: &[Rectangle]) -> Sweep {
         let swept = Span::from_seconds(-scan.duration_s());
         let (begin, end) = (scan.time() + swept, scan.time());
+        self.sources.note_lags(end);
         if !self.parameters.odometry {
             self.source = self.sources.best(end).map(|(source, _)| source);
             return self.sources.sweep(begin, end);
@@ -260,8 +290,10 @@ impl Ego {
         });
         self.rates
             .learn(&self.odometry, speed, yaw_rate, self.ahead_rad());
+        let pose = Pose::of(&self.odometry.pose_at(scan, -0.5 * scan.duration_s()));
+        let is_sure = self.odometry.report().quality == Quality::Following;
+        self.sources.compare(middle, is_sure.then_some(pose));
         if let Some((source, sensor)) = &sensor {
-            let pose = Pose::of(&self.odometry.pose_at(scan, -0.5 * scan.duration_s()));
             self.anchoring
                 .get_or_insert_with(|| {
                     Anchoring::at(source.frame(), &pose, sensor, &self.parameters)

@@ -132,6 +132,18 @@ impl Reading {
         }))
     }
 
+    /// Whether it is that of a receiver that knows no place yet, and says 0 degrees north and east.
+    pub(super) fn is_without_fix(&self) -> bool {
+        /// Some ten metres.
+        const NOWHERE_DEG: f64 = 1e-4;
+        match self {
+            Self::Fix(_, place, _) | Self::Place(place) => {
+                place.latitude_deg.abs() < NOWHERE_DEG && place.longitude_deg.abs() < NOWHERE_DEG
+            }
+            Self::Heading(_) | Self::Local(..) | Self::Speed(_) | Self::YawRate(_) => false,
+        }
+    }
+
     /// Whether its numbers can be a vehicle's on the earth.
     pub(super) fn is_plausible(&self) -> bool {
         /// Beyond this a local frame has lost its meaning.

@@ -2,8 +2,11 @@
 
 use super::geodesy::{Geodetic, LocalFrame};
 use super::history::{Blend, History};
+use super::lag::Clock;
 use super::reading::{Direction, Reading, Source};
+use super::senders::Senders;
 use super::sweep::KNOTS;
+use super::trust::Trust;
 use super::{Anchor, EgoParameters, HeadingUnit, Heard, Pose, Sweep, wrapped_rad};
 use crate::time::{Span, Time};
 use crate::wire::{Envelope, WireError};
@@ -21,6 +24,9 @@ pub(super) struct Sources {
     speeds: History<f64>,
     yaw_rates: History<f64>,
     simulation: History<Pose>,
+    senders: Senders,
+    /// In the order of [`SOURCES`].
+    trusts: [Trust; SOURCES.len()],
     current: Option<Source>,
     epoch: u32,
     jumps: u64,
@@ -76,6 +82,8 @@ impl Sources {
             speeds: History::default(),
             yaw_rates: History::default(),
             simulation: History::default(),
+            senders: Senders::default(),
+            trusts: Default::default(),
             current: None,
             epoch: 0,
             jumps: 0,
@@ -98,10 +106,79 @@ impl Sources {
         if !reading.is_plausible() {
             return Ok(Heard::Implausible);
         }
-        if self.parameters.use_poses {
-            self.take(envelope.time(), reading);
+        if reading.is_without_fix() {
+            return Ok(Heard::NoFix);
+        }
+        let (time, sender_stamp) = (envelope.time(), envelope.sender_stamp);
+        let admitted = self.senders.admit(envelope.data_type, sender_stamp, time);
+        if let Err(listened) = admitted {
+            return Ok(Heard::OtherSender {
+                sender_stamp,
+                listened,
+            });
+        }
+        if !self.parameters.use_poses {
+            return Ok(Heard::Pose);
+        }
+        self.take(time, reading);
+        if let Clock::Another(behind) = self.clock_of(&reading) {
+            return Ok(Heard::OtherClock { behind });
         }
         Ok(Heard::Pose)
+    }
+
+    /// The clock that stamps a kind of reading.
+    fn clock_of(&self, reading: &Reading) -> Clock {
+        match reading {
+            Reading::Fix(source, ..) | Reading::Local(source, _) => self.history(*source).clock(),
+            Reading::Place(_) => self.places.clock(),
+            Reading::Heading(_) => self.headings.clock(),
+            Reading::Speed(_) => self.speeds.clock(),
+            Reading::YawRate(_) => self.yaw_rates.clock(),
+        }
+    }
+
+    /// Notes at the end of a revolution how far each clock is behind.
+    pub(super) fn note_lags(&mut self, end: Time) {
+        for poses in [
+            &mut self.applanix,
+            &mut self.geolocation,
+            &mut self.simulation,
+        ] {
+            poses.note_lag(end);
+        }
+        self.places.note_lag(end);
+        self.headings.note_lag(end);
+        self.speeds.note_lag(end);
+        self.yaw_rates.note_lag(end);
+    }
+
+    /// How far the clock of a source is behind, seconds.
+    pub(super) fn behind_s(&self, source: Source) -> f64 {
+        let clock = match source {
+            Source::Separate => self.places.clock(),
+            _ => self.history(source).clock(),
+        };
+        match clock {
+            Clock::Same => 0.0,
+            Clock::Behind(lag) | Clock::Another(lag) => lag.seconds(),
+        }
+    }
+
+    /// Compares all sources with where the odometry has the sensor at a time, if it is sure of it.
+    pub(super) fn compare(&mut self, time: Time, seen: Option<Pose>) {
+        for (number, source) in SOURCES.into_iter().enumerate() {
+            let sensor = self
+                .pose_from(source, time)
+                .map(|vehicle| self.parameters.sensor(&vehicle));
+            self.trusts[number].compare(time, sensor.zip(seen));
+        }
+    }
+
+    /// A source that does not go as the sensor does.
+    pub(super) fn distrusted(&self) -> Option<Source> {
+        let mut both = SOURCES.into_iter().zip(&self.trusts);
+        both.find_map(|(source, trust)| (!trust.holds()).then_some(source))
     }
 
     fn take(&mut self, time: Time, reading: Reading) {
@@ -230,10 +307,10 @@ impl Sources {
     pub(super) fn pose_from(&self, source: Source, time: Time) -> Option<Pose> {
         let limit = self.limit();
         if source != Source::Separate {
-            return self.history(source).at(time, limit);
+            return self.history(source).at_end(time, limit);
         }
-        let position_m = self.places.at(time, limit)?;
-        let Yaw(yaw_rad) = self.headings.at(time, limit)?;
+        let position_m = self.places.at_end(time, limit)?;
+        let Yaw(yaw_rad) = self.headings.at_end(time, limit)?;
         Some(Pose {
             position_m,
             yaw_rad,
@@ -242,14 +319,15 @@ impl Sources {
 
     /// Ground speed and yaw rate as they are sent.
     pub(super) fn rates(&self, time: Time) -> [Option<f64>; 2] {
-        [&self.speeds, &self.yaw_rates].map(|history| history.at(time, self.limit()))
+        [&self.speeds, &self.yaw_rates].map(|history| history.at_end(time, self.limit()))
     }
 
-    /// The vehicle's pose from the most trusted source that has one.
+    /// The vehicle's pose from the first source that has one and is trusted.
     pub(super) fn best(&self, time: Time) -> Option<(Source, Pose)> {
-        SOURCES
-            .into_iter()
-            .find_map(|source| self.pose_from(source, time).map(|pose| (source, pose)))
+        let trusted = SOURCES.into_iter().zip(&self.trusts);
+        trusted
+            .filter(|(_, trust)| trust.holds())
+            .find_map(|(source, _)| self.pose_from(source, time).map(|pose| (source, pose)))
     }
 
     /// The sensor's poses from `begin` to `end` of a sweep by these sources alone. When another source is the most

@@ -372,7 +372,11 @@ mod tests {
             evidence.nearest_m[BESIDE + column].round()
         };
         assert_eq!((nearest_m(15.0), nearest_m(30.0)), (4.0, 10.0));
-        stretches(&mut evidence, &GridParameters::profile(Profile::Default), &mut passed);
+        stretches(
+            &mut evidence,
+            &GridParameters::profile(Profile::Default),
+            &mut passed,
+        );
         let column = scan.column_at(15f64.to_radians());
         let behind = passed
             .iter()

@@ -97,5 +97,9 @@ super::message! {
         /// Whose time revolutions of packets have: the sensor's where a GPS receiver keeps it (synchronised), or that of the
         /// arrival, because none does (free), it is more than 10 s away (apart), or so configured (configured).
         46 => sensor_clock: String,
+        /// How far the clock that stamps the poses in use is behind that of the revolutions, seconds; up to 2 s are made up for.
+        47 => pose_clock_behind: f32,
+        /// A source of poses that does not go as the sensor does and is not used; empty if there is none.
+        48 => pose_distrusted: String,
     }
 }
