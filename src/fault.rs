@@ -91,6 +91,8 @@ pub struct Counts {
     pub poses: u64,
     /// Sound poses that are of no use: of other senders, other clocks, or without a fix.
     pub poses_refused: u64,
+    /// Revolutions that were not answered between two that were.
+    pub missed: u64,
     /// Revolutions that kept the last good plane.
     pub ground_held: u64,
     /// Revolutions at the configured height.

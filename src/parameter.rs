@@ -2,6 +2,7 @@
 //! range, unit and meaning. Printing, reading and checking follow from it.
 
 use std::fmt;
+use std::net::Ipv4Addr;
 
 /// Where values come from that nobody set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,6 +85,8 @@ pub enum Domain {
     Real(f64, f64),
     /// One of these words.
     Choice(&'static [&'static str]),
+    /// Addresses of hosts.
+    Addresses,
 }
 
 impl fmt::Display for Domain {
@@ -93,6 +96,7 @@ impl fmt::Display for Domain {
             Self::Whole(low, high) if *high >= i64::MAX as f64 => write!(f, "{low} or more"),
             Self::Whole(low, high) | Self::Real(low, high) => write!(f, "{low} to {high}"),
             Self::Choice(names) => write!(f, "{}", names.join(", ")),
+            Self::Addresses => write!(f, "IPv4 addresses with commas between them"),
         }
     }
 }
@@ -136,6 +140,7 @@ fn wanted(domain: &Domain, unit: &str) -> String {
         Domain::Whole(..) => format!("a whole number, {domain}{}", spaced(unit)),
         Domain::Real(..) => format!("a number, {domain}{}", spaced(unit)),
         Domain::Choice(_) => format!("one of {domain}"),
+        Domain::Addresses => domain.to_string(),
     }
 }
 
@@ -235,6 +240,33 @@ impl Setting for f64 {
 
     fn number(&self) -> Option<f64> {
         Some(*self)
+    }
+}
+
+/// Addresses of hosts.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Addresses(pub Vec<Ipv4Addr>);
+
+impl Setting for Addresses {
+    fn domain(_bounds: Option<(f64, f64)>) -> Domain {
+        Domain::Addresses
+    }
+
+    fn to_value(&self) -> Value {
+        let texts: Vec<String> = self.0.iter().map(Ipv4Addr::to_string).collect();
+        Value::Text(texts.join(", "))
+    }
+
+    fn from_value(value: &Value) -> Option<Self> {
+        let Value::Text(text) = value else {
+            return None;
+        };
+        let parts = text
+            .split(',')
+            .map(str::trim)
+            .filter(|part| !part.is_empty());
+        let addresses: Option<_> = parts.map(|part| part.parse().ok()).collect();
+        addresses.map(Self)
     }
 }
 

@@ -265,6 +265,7 @@ impl Pipeline {
             self.grid.reset();
         }
         let time = self.scan.time();
+        let missed = self.missed_before(time);
         let expected = self.ego.expect(&self.scan);
         let moving = self.tracker.expect_moving(time, &expected);
         let sweep = self.ego.follow(&self.scan, moving);
@@ -306,6 +307,7 @@ impl Pipeline {
         let report = RevolutionReport {
             number: self.last.map_or(0, |last| last.number.wrapping_add(1)),
             time,
+            missed,
             time_jumped,
             sensor: self.scan.sensor().name,
             dialect,
@@ -319,11 +321,26 @@ impl Pipeline {
             clusters: clusters.len(),
             objects: self.objects.len(),
         };
+        self.counts.missed += report.missed;
         self.counts.time_jumps += u64::from(report.time_jumped);
         self.counts.ground_held += u64::from(ground.origin == Origin::Held);
         self.counts.ground_fallback += u64::from(ground.origin == Origin::Fallback);
         self.last = Some(report);
         report
+    }
+
+    /// How many revolutions should have been between the last one and one at a time.
+    fn missed_before(&self, time: Time) -> u64 {
+        /// A longer one is a pause: somebody has stopped what is played.
+        const LONGEST_S: f64 = 10.0;
+        let passed_s = self.last.map_or(0.0, |last| (time - last.time).seconds());
+        let turns = libm::round(passed_s * self.scan.rotation_hz());
+        let is_gap = (0.0..LONGEST_S).contains(&passed_s);
+        if is_gap {
+            (turns as u64).saturating_sub(1)
+        } else {
+            0
+        }
     }
 
     /// The frames that say what is around in the last revolution, in the order in which they are
@@ -427,6 +444,7 @@ impl Pipeline {
             revolutions_published: self.last.map_or(0, |last| u64::from(last.number) + 1),
             revolutions_refused: self.counts.refused,
             datagrams_damaged: self.counts.damaged,
+            revolutions_missed: self.counts.missed,
             packets_received: self.counts.packets,
             packets_lost: self.counts.packets_lost,
             packets_late: self.counts.packets_late,

@@ -62,6 +62,8 @@ pub struct RevolutionReport {
     pub number: u32,
     /// End of the sweep.
     pub time: Time,
+    /// Revolutions that were missed since the one before, by their times; of a pause none.
+    pub missed: u64,
     /// Whether time jumped, so that tracks began anew.
     pub time_jumped: bool,
     /// Name of the sensor.

@@ -12,6 +12,7 @@ mod common;
 #[path = "common/network.rs"]
 mod network;
 
+use std::net::{Ipv4Addr, SocketAddrV4};
 use std::time::{Duration, Instant};
 
 use kreisel::random::Random;
@@ -404,5 +405,97 @@ fn the_examples_print_what_a_daemon_sends() {
         let (_, shown, log) = example.output();
         assert!(shown.contains("revolution 40: 7 objects"), "{shown}{log}");
         assert!(shown.contains("  pedestrian "), "{shown}{log}");
+    });
+}
+
+/// Runs `ip` with these words.
+fn ip(words: &str) {
+    let result = std::process::Command::new("ip")
+        .args(words.split(' '))
+        .status();
+    assert!(result.unwrap().success(), "ip {words}");
+}
+
+#[test]
+#[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
+fn an_interface_that_is_made_anew_is_joined_again() {
+    in_namespace(|| {
+        let make = || {
+            ip("link add kreisel0 type veth peer name kreisel1");
+            ip("link set kreisel1 up");
+            ip("address add 10.9.0.1/24 dev kreisel0");
+            ip("link set kreisel0 up multicast on");
+        };
+        make();
+        let daemon = Running::daemon(&["--interface=10.9.0.1"]);
+        let peer = Peer::join_on(Ipv4Addr::new(10, 9, 0, 1));
+        let revolutions = revolutions(4);
+        peer.send(&revolutions[0]);
+        peer.await_message::<ObjectList>(|list| list.revolution == 0);
+        ip("link delete kreisel0");
+        let health = || Running::kreisel(&["health"]).output().2;
+        await_true("its blindness", || {
+            health().contains("blind: no interface has the address 10.9.0.1")
+        });
+        make();
+        await_true("its return", || !health().contains("no interface"));
+        let peer = Peer::join_on(Ipv4Addr::new(10, 9, 0, 1));
+        peer.send(&revolutions[1]);
+        peer.await_message::<ObjectList>(|list| list.revolution == 1);
+        let (code, _, log) = daemon.stop();
+        assert_eq!(code, 0);
+        assert!(
+            log.contains("cut off from the session") && log.contains("joined the session anew"),
+            "{log}"
+        );
+    });
+}
+
+#[test]
+#[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
+fn another_host_and_a_twin_are_told_and_change_nothing() {
+    in_namespace(|| {
+        let _daemon = Running::daemon(&["--interface=127.0.0.1"]);
+        let peer = Peer::join();
+        let revolutions = revolutions(6);
+        let other =
+            socket2::Socket::new(socket2::Domain::IPV4, socket2::Type::DGRAM, None).unwrap();
+        let from = SocketAddrV4::new(Ipv4Addr::new(127, 0, 0, 2), 0);
+        other.bind(&from.into()).unwrap();
+        other.set_multicast_if_v4(&Ipv4Addr::LOCALHOST).unwrap();
+        let other: std::net::UdpSocket = other.into();
+        let mut twin = vec![];
+        Postmark::default().put(&mut twin, &ObjectList::default());
+        for revolution in &revolutions {
+            peer.send(revolution);
+            other.send_to(revolution, peer.group).unwrap();
+        }
+        other.send_to(&twin, peer.group).unwrap();
+        let status = peer.await_message::<Status>(|status| status.revolutions_published == 6);
+        assert!(status.faults.contains("other_source="), "{}", status.faults);
+        assert!(status.faults.contains("twin=1"), "{}", status.faults);
+        assert_eq!(status.revolutions_refused, 0);
+    });
+}
+
+#[test]
+#[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
+fn missed_revolutions_are_counted_and_make_it_degraded() {
+    in_namespace(|| {
+        let _daemon = Running::daemon(&[]);
+        let peer = Peer::join();
+        for (number, revolution) in revolutions(20).iter().enumerate() {
+            if number % 4 != 2 {
+                peer.send(revolution);
+                std::thread::sleep(Duration::from_millis(30));
+            }
+        }
+        let status = peer.await_message::<Status>(|status| status.revolutions_published == 15);
+        assert_eq!(status.revolutions_missed, 5);
+        assert_eq!(
+            status.health,
+            "degraded: 25 % of the revolutions are missed"
+        );
+        assert!(!status.healthy);
     });
 }

@@ -15,7 +15,10 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     match health::check(arguments.cid) {
-        Ok(()) => Ok(Completion::Done),
+        Ok(()) => {
+            say!("ok");
+            Ok(Completion::Done)
+        }
         Err(problem) => bail!("unhealthy: {problem}"),
     }
 }

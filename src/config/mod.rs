@@ -8,7 +8,7 @@ use crate::cluster::ClusterParameters;
 use crate::ego::EgoParameters;
 use crate::grid::GridParameters;
 use crate::ground::GroundParameters;
-use crate::parameter::{Profile, Section, Value, parameters};
+use crate::parameter::{Addresses, Profile, Section, Value, parameters};
 use crate::publish::PublishParameters;
 use crate::track::TrackParameters;
 
@@ -24,6 +24,12 @@ parameters! {
         /// Revolutions that may wait for the pipeline. When another one comes, the oldest is
         /// dropped and counted.
         queue_revolutions: usize = 8, in 1..=64, "revolutions";
+        /// Share of the revolutions of the last 10 to 20 s that may be missed, by their time stamps, before the service says
+        /// that it is degraded.
+        most_missed_share: f64 = 0.05, in 0.0..=1.0, "";
+        /// Hosts whose point clouds and poses are taken, as "10.0.0.1, 10.0.0.2". If empty, of each message those of the
+        /// first host that sends a sound one, until it is silent for a second.
+        sources: Addresses = Addresses::default(), "";
     }
 }
 

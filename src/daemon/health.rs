@@ -2,7 +2,8 @@
 //! file system, no port and no shell, and is seen only on this host and in its network
 //! namespace.
 
-use std::cell::Cell;
+use std::cell::RefCell;
+use std::fmt;
 use std::io::Read as _;
 use std::os::linux::net::SocketAddrExt as _;
 use std::os::unix::net::{SocketAddr, UnixListener, UnixStream};
@@ -11,68 +12,138 @@ use std::time::{Duration, Instant};
 use tokio::io::AsyncWriteExt as _;
 use tracing::info;
 
-/// Without an answered revolution for this long, the daemon is not receiving.
-const SILENCE: Duration = Duration::from_secs(2);
-/// After a drop, the daemon counts as not keeping up for this long.
-const DROP_MEMORY: Duration = Duration::from_secs(10);
+/// Without an answered revolution for this long, the daemon is not receiving: five revolutions at the slowest.
+const SILENCE: Duration = Duration::from_secs(1);
+/// What went wrong counts for this long.
+const MEMORY: Duration = Duration::from_secs(10);
 /// Name of the sockets, before the session's number and the process'.
 const NAME_PREFIX: &str = "kreisel-health-";
 
-/// What health is judged by.
-#[derive(Debug, Default)]
-pub struct Vitals {
-    state: Cell<State>,
+/// How the daemon is, in one word, and why.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Health {
+    /// It receives and keeps up.
+    Well,
+    /// It answers, but not all that there is.
+    Degraded(String),
+    /// It perceives nothing.
+    Blind(String),
 }
 
-#[derive(Debug, Default, Clone, Copy)]
+impl fmt::Display for Health {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Well => write!(f, "ok"),
+            Self::Degraded(why) => write!(f, "degraded: {why}"),
+            Self::Blind(why) => write!(f, "blind: {why}"),
+        }
+    }
+}
+
+/// What health is judged by.
+#[derive(Debug)]
+pub struct Vitals {
+    most_missed_share: f64,
+    state: RefCell<State>,
+}
+
+#[derive(Debug)]
 struct State {
     last_answer: Option<Instant>,
-    last_drop: Option<Instant>,
     dropped: u64,
+    /// Revolutions that were answered and missed since a time, and in the same time before.
+    begun: Instant,
+    now: [u64; 2],
+    before: [u64; 2],
+    /// What went wrong last, and when.
+    trouble: Option<(Instant, String)>,
+    /// Why nothing can come in.
+    cut_off: Option<String>,
 }
 
 impl Vitals {
-    /// Notes that a revolution was answered.
-    pub(super) fn answered(&self) {
-        self.state.set(State {
-            last_answer: Some(Instant::now()),
-            ..self.state.get()
-        });
+    /// Of a daemon that may miss such a share of the revolutions.
+    pub(super) fn new(most_missed_share: f64) -> Self {
+        let state = State {
+            last_answer: None,
+            dropped: 0,
+            begun: Instant::now(),
+            now: [0; 2],
+            before: [0; 2],
+            trouble: None,
+            cut_off: None,
+        };
+        Self {
+            most_missed_share,
+            state: RefCell::new(state),
+        }
+    }
+
+    /// Notes that a revolution was answered, and how many were missed before it.
+    pub(super) fn answered(&self, missed: u64) {
+        let mut state = self.state.borrow_mut();
+        state.last_answer = Some(Instant::now());
+        if state.begun.elapsed() > MEMORY {
+            state.begun = Instant::now();
+            state.before = std::mem::take(&mut state.now);
+        }
+        state.now[0] += 1;
+        state.now[1] += missed;
     }
 
     /// Notes how many datagrams and revolutions were dropped so far.
     pub(super) fn dropped(&self, total: u64) {
-        let state = self.state.get();
-        if total > state.dropped {
-            self.state.set(State {
-                last_drop: Some(Instant::now()),
-                dropped: total,
-                ..state
-            });
+        let is_more = total > self.state.borrow().dropped;
+        if is_more {
+            self.state.borrow_mut().dropped = total;
+            self.trouble(format!("not keeping up: {total} dropped so far"));
         }
     }
 
-    /// `Ok`, or what is wrong.
-    pub(super) fn verdict(&self) -> Result<(), String> {
-        let state = self.state.get();
-        match (state.last_answer, state.last_drop) {
-            (None, _) => Err("no revolution was answered yet".into()),
-            (Some(last), _) if last.elapsed() > SILENCE => Err(format!(
-                "no revolution was answered for {:.1} s",
-                last.elapsed().as_secs_f64()
-            )),
-            (_, Some(last)) if last.elapsed() < DROP_MEMORY => Err(format!(
-                "not keeping up: {} dropped so far, the last {:.1} s ago",
-                state.dropped,
-                last.elapsed().as_secs_f64()
-            )),
-            _ => Ok(()),
+    /// Notes that something went wrong.
+    pub(super) fn trouble(&self, why: String) {
+        self.state.borrow_mut().trouble = Some((Instant::now(), why));
+    }
+
+    /// Notes why nothing can come in, or that it can again.
+    pub(super) fn cut_off(&self, why: Option<String>) {
+        self.state.borrow_mut().cut_off = why;
+    }
+
+    /// How the daemon is.
+    pub(super) fn verdict(&self) -> Health {
+        let state = self.state.borrow();
+        if let Some(why) = &state.cut_off {
+            return Health::Blind(why.clone());
         }
+        match state.last_answer {
+            None => return Health::Blind("no revolution was answered yet".into()),
+            Some(last) if last.elapsed() > SILENCE => {
+                let seconds = last.elapsed().as_secs_f64();
+                return Health::Blind(format!("no revolution was answered for {seconds:.1} s"));
+            }
+            Some(_) => {}
+        }
+        if let Some((at, why)) = &state.trouble
+            && at.elapsed() < MEMORY
+        {
+            let seconds = at.elapsed().as_secs_f64();
+            return Health::Degraded(format!("{why}, {seconds:.1} s ago"));
+        }
+        let [answered, missed] = [0, 1].map(|count| state.now[count] + state.before[count]);
+        let share = missed as f64 / (answered + missed).max(1) as f64;
+        if share > self.most_missed_share {
+            let percent = 100.0 * share;
+            return Health::Degraded(format!("{percent:.0} % of the revolutions are missed"));
+        }
+        Health::Well
     }
 }
 
 /// Answers health checks for ever. Without the socket the daemon works all the same.
 pub(super) async fn serve(cid: u8, vitals: &Vitals) {
+    /// After a failure, which is one of the system that will not be over at once.
+    const PAUSE: Duration = Duration::from_secs(1);
     let listener = match listen(cid) {
         Ok(listener) => listener,
         Err(error) => {
@@ -81,13 +152,13 @@ pub(super) async fn serve(cid: u8, vitals: &Vitals) {
         }
     };
     loop {
-        if let Ok((mut stream, _)) = listener.accept().await {
-            let answer = match vitals.verdict() {
-                Ok(()) => "ok".into(),
-                Err(problem) => problem,
-            };
+        match listener.accept().await {
             // A client that does not read has no claim to an answer.
-            let _ = stream.write_all(answer.as_bytes()).await;
+            Ok((mut stream, _)) => {
+                let answer = vitals.verdict().to_string();
+                let _ = stream.write_all(answer.as_bytes()).await;
+            }
+            Err(_) => tokio::time::sleep(PAUSE).await,
         }
     }
 }
@@ -99,7 +170,7 @@ fn listen(cid: u8) -> std::io::Result<tokio::net::UnixListener> {
     tokio::net::UnixListener::from_std(listener)
 }
 
-/// Asks every daemon on this host, or those of one session; `Err` says what is wrong.
+/// Asks every daemon on this host, or those of one session; `Err` says what is wrong with the first that is not well.
 pub fn check(cid: Option<u8>) -> Result<(), String> {
     let names = daemons(cid);
     if names.is_empty() {
@@ -150,13 +221,31 @@ mod tests {
 
     #[test]
     fn health_needs_an_answer_and_no_drops() {
-        let vitals = Vitals::default();
-        assert!(vitals.verdict().unwrap_err().contains("yet"));
-        vitals.answered();
-        assert_eq!(vitals.verdict(), Ok(()));
+        let vitals = Vitals::new(0.05);
+        assert!(matches!(vitals.verdict(), Health::Blind(why) if why.contains("yet")));
+        vitals.answered(0);
+        assert_eq!(vitals.verdict(), Health::Well);
         vitals.dropped(0);
-        assert_eq!(vitals.verdict(), Ok(()));
+        assert_eq!(vitals.verdict(), Health::Well);
         vitals.dropped(3);
-        assert!(vitals.verdict().unwrap_err().contains("3 dropped"));
+        let verdict = vitals.verdict().to_string();
+        assert!(
+            verdict.starts_with("degraded: not keeping up: 3 dropped"),
+            "{verdict}"
+        );
+        vitals.cut_off(Some("the interface is gone".into()));
+        assert_eq!(vitals.verdict().to_string(), "blind: the interface is gone");
+    }
+
+    #[test]
+    fn a_share_of_missed_revolutions_is_told() {
+        let vitals = Vitals::new(0.05);
+        for number in 0..100 {
+            vitals.answered(u64::from(number % 50 == 7));
+        }
+        assert_eq!(vitals.verdict(), Health::Well);
+        (0..10).for_each(|_| vitals.answered(1));
+        let verdict = vitals.verdict().to_string();
+        assert_eq!(verdict, "degraded: 10 % of the revolutions are missed");
     }
 }

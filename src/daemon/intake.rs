@@ -2,10 +2,14 @@
 
 use tracing::trace;
 
+use std::net::Ipv4Addr;
+use std::time::{Duration, Instant};
+
 use super::fault_log::FaultLog;
+use super::kernel::KernelCounts;
 use super::listener::{Arrival, Datagram};
 use super::queue::Queue;
-use crate::pipeline::Pipeline;
+use crate::pipeline::{OWN_IDS, Pipeline};
 use crate::tally::Tally;
 use crate::wire::Envelope;
 use crate::wire::point_cloud::POINT_CLOUD_ID;
@@ -22,13 +26,24 @@ pub(super) struct Intake {
     pub(super) kernel_dropped: u64,
     pub(super) faults: Tally,
     log: FaultLog,
+    /// senderStamp of what this daemon sends.
+    sender_stamp: u32,
+    /// Hosts that are listened to; any if there are none.
+    sources: Vec<Ipv4Addr>,
+    /// Of each message the host that is listened to, and when it was heard last.
+    listened: Vec<(i32, Ipv4Addr, Instant)>,
+    /// What the kernel had counted when something was dropped last.
+    kernel: KernelCounts,
     /// Whether revolutions come from a sensor's own packets, and point clouds are none of ours.
     has_sensor: bool,
 }
 
 impl Intake {
-    pub(super) fn new(has_sensor: bool) -> Self {
+    pub(super) fn new(sender_stamp: u32, sources: &[Ipv4Addr], has_sensor: bool) -> Self {
         Self {
+            sender_stamp,
+            sources: sources.to_vec(),
+            kernel: KernelCounts::read(),
             has_sensor,
             ..Self::default()
         }
@@ -40,8 +55,16 @@ impl Intake {
         if arrival.kernel_dropped > self.kernel_dropped {
             let lost = arrival.kernel_dropped - self.kernel_dropped;
             self.kernel_dropped = arrival.kernel_dropped;
+            let kernel = &mut self.kernel;
             self.log.note("kernel_dropped", || {
-                format!("{lost} datagrams: the receive buffer was full")
+                let now = KernelCounts::read();
+                let wrong = now.since(kernel).checksums_wrong;
+                *kernel = now;
+                if wrong > 0 {
+                    format!("{lost} datagrams: the checksums of {wrong} on this host were wrong")
+                } else {
+                    format!("{lost} datagrams: the receive buffer was full")
+                }
             });
         }
         if arrival.is_own {
@@ -61,8 +84,22 @@ impl Intake {
                 format!("{rest} bytes after the envelope from {source} not read")
             });
         }
-        if !Pipeline::concerns(envelope.data_type) {
+        let is_twin =
+            OWN_IDS.contains(&envelope.data_type) && envelope.sender_stamp == self.sender_stamp;
+        if is_twin {
+            self.faults.count("twin");
+            let id = self.sender_stamp;
+            self.log.note("twin", || {
+                format!("{source} sends what this service sends, with the same id {id}: give one of them another --id")
+            });
+        } else if !Pipeline::concerns(envelope.data_type) {
             trace!("message {} from {source} passed over", envelope.data_type);
+        } else if !self.listens_to(envelope.data_type, *source.ip()) {
+            self.faults.count("other_source");
+            let data_type = envelope.data_type;
+            self.log.note("other_source", || {
+                format!("message {data_type} from {source}, while another host is listened to")
+            });
         } else if envelope.data_type == POINT_CLOUD_ID && self.has_sensor {
             self.faults.count("cloud_beside_sensor");
             self.log.note("cloud_beside_sensor", || {
@@ -78,6 +115,31 @@ impl Intake {
         } else {
             queue.push_other(datagram, arrival.time);
         }
+    }
+
+    /// Whether a host's messages of a number are taken: those of the hosts that are configured, else those of the first
+    /// one that is heard, until it is silent.
+    fn listens_to(&mut self, data_type: i32, host: Ipv4Addr) -> bool {
+        const SILENCE: Duration = Duration::from_secs(1);
+        if !self.sources.is_empty() {
+            return self.sources.contains(&host);
+        }
+        let known = self.listened.iter_mut().find(|known| known.0 == data_type);
+        let Some((_, listened, heard)) = known else {
+            self.listened.push((data_type, host, Instant::now()));
+            return true;
+        };
+        if *listened != host {
+            if heard.elapsed() < SILENCE {
+                return false;
+            }
+            let before = std::mem::replace(listened, host);
+            self.log.note("source_changed", || {
+                format!("message {data_type} comes from {host} now, and no more from {before}")
+            });
+        }
+        *heard = Instant::now();
+        true
     }
 
     fn refuse(&mut self, name: &'static str, text: impl FnOnce() -> String) {

@@ -15,6 +15,8 @@ pub mod health;
 
 mod intake;
 
+mod kernel;
+
 mod latency;
 
 pub mod listener;
@@ -25,6 +27,8 @@ pub mod sensor;
 
 pub mod session;
 
+mod way;
+
 mod worker;
 
 use std::convert::Infallible;
@@ -34,16 +38,18 @@ use std::time::Duration;
 use tokio::time::{MissedTickBehavior, interval};
 use tracing::{info, warn};
 
-use crate::config::Configuration;
+use crate::config::{Configuration, SessionParameters};
 use crate::pipeline::Pipeline;
 use crate::time::Time;
 use crate::view::Feed;
 use health::Vitals;
 use intake::Intake;
+use kernel::KernelCounts;
 use listener::Datagram;
 use queue::Queue;
 use sensor::{SensorError, SensorPort, SensorPorts};
 use session::{Receiver, Session, SessionError};
+use way::Way;
 use worker::{Output, Worker};
 
 /// What a user says on the command line about a daemon.
@@ -89,6 +95,10 @@ const MOST_AT_ONCE: usize = 256;
 /// [`DaemonError`] when the session cannot be joined or the sensor not be heard, or when they are lost.
 pub async fn run(options: Options, stop: impl Future<Output = ()>) -> Result<(), DaemonError> {
     let parameters = &options.configuration.session;
+    let way = options
+        .session
+        .as_ref()
+        .and_then(|session| Way::into(session).ok());
     let joined = options
         .session
         .map(|session| session.join(parameters))
@@ -107,11 +117,12 @@ pub async fn run(options: Options, stop: impl Future<Output = ()>) -> Result<(),
     }
     let buffer_bytes = receiver.as_ref().map(Receiver::buffer_bytes);
     let buffer_bytes = buffer_bytes.or(sensor.as_ref().map(SensorPorts::buffer_bytes));
-    let vitals = Vitals::default();
+    let vitals = Vitals::new(parameters.most_missed_share);
     let output = Output {
         sender,
         sender_stamp: options.sender_stamp,
         view: options.view,
+        not_sent: 0,
     };
     let worker = Worker::new(
         Pipeline::new(&options.configuration, options.sender_stamp),
@@ -123,9 +134,18 @@ pub async fn run(options: Options, stop: impl Future<Output = ()>) -> Result<(),
     let mut service = Service {
         receiver,
         sensor,
-        intake: Intake::new(options.sensor.is_some()),
+        intake: Intake::new(
+            options.sender_stamp,
+            &parameters.sources.0,
+            options.sensor.is_some(),
+        ),
         queue: Queue::new(parameters.queue_revolutions),
         worker,
+        session: options.session,
+        parameters: parameters.clone(),
+        way,
+        kernel: KernelCounts::read(),
+        vitals: &vitals,
     };
     let cid = options.session.map_or(0, |session| session.cid);
     let result = tokio::select! {
@@ -161,6 +181,12 @@ struct Service<'a> {
     intake: Intake,
     queue: Queue,
     worker: Worker<'a>,
+    session: Option<Session>,
+    parameters: SessionParameters,
+    /// How the session was joined.
+    way: Option<Way>,
+    kernel: KernelCounts,
+    vitals: &'a Vitals,
 }
 
 impl Service<'_> {
@@ -195,11 +221,54 @@ impl Service<'_> {
             let counts = self.sensor.as_ref().map(|sensor| &sensor.counts);
             self.worker.note_drops(&self.intake, &self.queue, counts);
             if is_due {
+                self.watch_network();
+                self.watch_kernel();
+                let counts = self.sensor.as_ref().map(|sensor| &sensor.counts);
                 self.worker.send_status(&self.intake, &self.queue, counts);
             }
             // Health checks and signals have their turn even when there is always more to do.
             tokio::task::yield_now().await;
         }
+    }
+
+    /// Joins the session anew where the way to it is another one than it was: an interface came, went, was made anew or
+    /// has another address.
+    fn watch_network(&mut self) {
+        let Some(session) = &self.session else { return };
+        let problem = match Way::into(session) {
+            Ok(way) if self.way == Some(way) => None,
+            Ok(way) => match session.join(&self.parameters) {
+                Ok((receiver, sender)) => {
+                    match self.way {
+                        Some(before) => {
+                            warn!("joined the session anew over {way}: it was {before}")
+                        }
+                        None => warn!("joined the session anew over {way}"),
+                    }
+                    tell_joined(&receiver, self.parameters.ttl);
+                    self.receiver = Some(receiver);
+                    self.worker.set_sender(sender);
+                    self.way = Some(way);
+                    None
+                }
+                Err(error) => Some(error.to_string()),
+            },
+            Err(error) => Some(error.to_string()),
+        };
+        if let Some(problem) = &problem {
+            if self.way.take().is_some() {
+                warn!("cut off from the session: {problem}");
+            }
+        }
+        self.vitals.cut_off(problem);
+    }
+
+    /// Says what the kernel lost before it reached a socket.
+    fn watch_kernel(&mut self) {
+        let now = KernelCounts::read();
+        let lost = now.since(&self.kernel).fragmented_lost;
+        self.kernel = now;
+        self.worker.note_fragments(lost);
     }
 
     /// Takes in what has come meanwhile.

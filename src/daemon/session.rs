@@ -76,6 +76,11 @@ impl Session {
     pub fn join(&self, parameters: &SessionParameters) -> Result<(Receiver, Sender), SessionError> {
         let (socket, interface) = self.receiving_socket()?;
         let sender = self.sender_on(interface, parameters.ttl)?;
+        // A stalled interface must not hold up what comes in.
+        sender
+            .socket
+            .set_nonblocking(true)
+            .map_err(self.failed("make the sending socket"))?;
         let own = sender.socket.local_addr().ok();
         let listener = Listener::new(socket, parameters.receive_buffer_mb, own)
             .map_err(self.failed("watch the socket"))?;

@@ -5,7 +5,7 @@ use std::time::Instant;
 use tracing::{debug, info, trace, warn};
 
 use super::fault_log::FaultLog;
-use super::health::Vitals;
+use super::health::{Health, Vitals};
 use super::intake::Intake;
 use super::latency::Latency;
 use super::listener::{Arrival, Datagram};
@@ -48,7 +48,12 @@ pub(super) struct Worker<'a> {
     ego: Option<EgoReport>,
     /// Revolutions of packets that were dropped because the next one was there.
     replaced: u64,
+    /// What was said of it last.
+    health: Health,
     dropped_revolutions: u64,
+    fragmented_lost: u64,
+    /// Frames that were not sent at the last Status.
+    told_not_sent: u64,
     log: FaultLog,
     frame: Vec<u8>,
 }
@@ -67,6 +72,8 @@ pub(super) struct Output {
     pub(super) sender_stamp: u32,
     /// The view, if there is one.
     pub(super) view: Option<Feed>,
+    /// Frames that could not be sent.
+    pub(super) not_sent: u64,
 }
 
 impl Output {
@@ -77,6 +84,7 @@ impl Output {
                 view.put(frame);
             }
             if let Some(Err(error)) = self.sender.as_ref().map(|sender| sender.send(frame)) {
+                self.not_sent += 1;
                 log.note("send", || error.to_string());
             }
         }
@@ -119,7 +127,10 @@ impl<'a> Worker<'a> {
             told: Told::default(),
             ego: None,
             replaced: 0,
+            health: Health::Well,
             dropped_revolutions: 0,
+            fragmented_lost: 0,
+            told_not_sent: 0,
             log: FaultLog::default(),
             frame: vec![],
         }
@@ -209,7 +220,7 @@ impl<'a> Worker<'a> {
         let frames = self.pipeline.publish_objects(now(), processing_s);
         self.output.send(frames, &mut self.log);
         self.latency.record(now() - arrival);
-        self.vitals.answered();
+        self.vitals.answered(report.missed);
         self.pipeline.update_map();
         let frames = self.pipeline.publish_map(now());
         self.output.send(frames, &mut self.log);
@@ -218,6 +229,25 @@ impl<'a> Worker<'a> {
             view.show(&self.pipeline, report, None);
         }
         self.tell(report);
+    }
+
+    /// Sends into a session that was joined anew.
+    pub(super) fn set_sender(&mut self, sender: Sender) {
+        self.output.sender = Some(sender);
+    }
+
+    /// Notes fragmented datagrams that were lost.
+    pub(super) fn note_fragments(&mut self, lost: u64) {
+        self.fragmented_lost += lost;
+        if lost > 0 {
+            self.log.note("fragmented_lost", || {
+                format!(
+                    "{lost} fragmented datagrams of this host could not be put together: revolutions are lost on the \
+                     network; sysctl net.ipv4.ipfrag_time=1 net.ipv4.ipfrag_high_thresh=67108864 helps where fragments \
+                     clog the kernel"
+                )
+            });
+        }
     }
 
     /// Notes what could not be answered.
@@ -271,7 +301,25 @@ impl<'a> Worker<'a> {
         status.latency_p999 = latency.p999_s;
         status.latency_max = latency.max_s;
         status.receive_buffer = self.receive_buffer as u32;
-        status.healthy = self.vitals.verdict().is_ok();
+        let not_sent = self.output.not_sent;
+        if not_sent > self.told_not_sent {
+            self.told_not_sent = not_sent;
+            self.vitals
+                .trouble(format!("{not_sent} frames could not be sent"));
+        }
+        status.frames_not_sent = not_sent;
+        status.fragmented_lost = self.fragmented_lost;
+        let health = self.vitals.verdict();
+        status.healthy = health == Health::Well;
+        status.health = health.to_string();
+        let is_new = std::mem::discriminant(&self.health) != std::mem::discriminant(&health);
+        if is_new {
+            match &health {
+                Health::Well => info!("health: ok"),
+                health => warn!("health: {health}"),
+            }
+            self.health = health;
+        }
         if let Some(view) = &mut self.output.view {
             view.tell(&status);
         }

@@ -16,13 +16,11 @@ pub(super) struct Told {
 const SILENCE: Duration = Duration::from_secs(3);
 
 /// Whether the daemon receives and keeps up, or why it does not.
-pub(super) fn health(told: Option<&Told>) -> Result<(), &'static str> {
+pub(super) fn health(told: Option<&Told>) -> Result<(), String> {
     match told {
-        None => Err("nothing is known yet"),
-        Some(told) if told.at.elapsed() > SILENCE => Err("the daemon does not answer"),
-        Some(told) if !told.status.healthy => {
-            Err("no revolution is answered, or some were dropped")
-        }
+        None => Err("nothing is known yet".into()),
+        Some(told) if told.at.elapsed() > SILENCE => Err("the daemon does not answer".into()),
+        Some(told) if !told.status.healthy => Err(told.status.health.clone()),
         Some(_) => Ok(()),
     }
 }
@@ -130,6 +128,21 @@ fn families(status: &Status) -> Vec<Family> {
             "datagrams_damaged_total",
             status.datagrams_damaged,
             "Datagrams that were no sound envelope",
+        ),
+        counter(
+            "revolutions_missed_total",
+            status.revolutions_missed,
+            "Revolutions that were not answered between two that were",
+        ),
+        counter(
+            "frames_not_sent_total",
+            status.frames_not_sent,
+            "Frames that could not be sent",
+        ),
+        counter(
+            "fragmented_lost_total",
+            status.fragmented_lost,
+            "Fragmented datagrams that this host could not put together",
         ),
         counter(
             "packets_received_total",

@@ -101,5 +101,13 @@ super::message! {
         47 => pose_clock_behind: f32,
         /// A source of poses that does not go as the sensor does and is not used; empty if there is none.
         48 => pose_distrusted: String,
+        /// Revolutions that were not answered between two that were, by their time stamps.
+        49 => revolutions_missed: u64,
+        /// How the service is, in a word, and why: ok, degraded (it answers, but not all that there is), or blind.
+        50 => health: String,
+        /// Frames that could not be sent.
+        51 => frames_not_sent: u64,
+        /// Fragmented datagrams that the kernel could not put together, of the whole host.
+        52 => fragmented_lost: u64,
     }
 }

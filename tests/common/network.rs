@@ -131,21 +131,23 @@ pub fn await_true(what: &str, mut condition: impl FnMut() -> bool) {
 /// A peer in the session: sends datagrams, and hears everything.
 pub struct Peer {
     pub socket: UdpSocket,
-    group: SocketAddrV4,
+    pub group: SocketAddrV4,
 }
 
 impl Peer {
     pub fn join() -> Self {
+        Self::join_on(Ipv4Addr::LOCALHOST)
+    }
+
+    pub fn join_on(interface: Ipv4Addr) -> Self {
         use socket2::{Domain, Socket, Type};
         let group = SocketAddrV4::new(Ipv4Addr::new(225, 0, 0, CID), 12_175);
         let socket = Socket::new(Domain::IPV4, Type::DGRAM, None).unwrap();
         socket.set_reuse_address(true).unwrap();
         socket.set_recv_buffer_size(8 << 20).unwrap();
         socket.bind(&group.into()).unwrap();
-        socket
-            .join_multicast_v4(group.ip(), &Ipv4Addr::LOCALHOST)
-            .unwrap();
-        socket.set_multicast_if_v4(&Ipv4Addr::LOCALHOST).unwrap();
+        socket.join_multicast_v4(group.ip(), &interface).unwrap();
+        socket.set_multicast_if_v4(&interface).unwrap();
         socket
             .set_read_timeout(Some(Duration::from_millis(100)))
             .unwrap();
