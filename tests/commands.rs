@@ -445,3 +445,17 @@ fn without_an_output_file_it_is_told_what_was_seen() {
         "{text}"
     );
 }
+
+#[test]
+fn too_few_file_descriptors_are_an_error_and_no_panic() {
+    for limit in [6, 7, 8, 12, 20] {
+        let script = format!(
+            "ulimit -n {limit}; exec {} run --cid=9",
+            env!("CARGO_BIN_EXE_kreisel")
+        );
+        let output = Command::new("sh").args(["-c", &script]).output().unwrap();
+        assert_eq!(code(&output), 1, "{limit}: {}", stderr(&output));
+        let problem = "kreisel: cannot open sockets: Too many open files (os error 24)\n";
+        assert_eq!(stderr(&output), problem, "{limit}");
+    }
+}

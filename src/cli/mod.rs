@@ -65,6 +65,7 @@ mod view;
 use std::net::Ipv4Addr;
 use std::process::ExitCode;
 
+use anyhow::Context as _;
 use clap::{Args, Parser, Subcommand};
 use tracing::Level;
 
@@ -197,8 +198,15 @@ fn log_to_stderr(level: Level) {
         .init();
 }
 
+/// File descriptors that sockets, signals and the view of a command may need. Where they are missing, tokio panics.
+const DESCRIPTORS: usize = 24;
+
 /// Runs async work on this thread until it ends.
 fn block_on<T>(work: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<T> {
+    let spare: Result<Vec<_>, _> = (0..DESCRIPTORS)
+        .map(|_| std::fs::File::open("/dev/null"))
+        .collect();
+    drop(spare.context("cannot open sockets")?);
     tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()?

@@ -255,10 +255,10 @@ impl Service<'_> {
             },
             Err(error) => Some(error.to_string()),
         };
-        if let Some(problem) = &problem {
-            if self.way.take().is_some() {
-                warn!("cut off from the session: {problem}");
-            }
+        if let Some(problem) = &problem
+            && self.way.take().is_some()
+        {
+            warn!("cut off from the session: {problem}");
         }
         self.vitals.cut_off(problem);
     }

@@ -85,7 +85,8 @@ parameters! {
         lowest_probability: f64 = 0.1, in 0.001..=0.4, "";
         /// Probability above which no cell rises, so that what leaves disappears soon.
         highest_probability: f64 = 0.96, in 0.6..=0.999, "";
-        /// Height above the ground from which on a return is an obstacle. 0.08 shows kerbs.
+        /// Height above the ground from which on a return is an obstacle. 0.08 shows kerbs where ground.mark_distance_m
+        /// is 0.06; else they are ground.
         obstacle_low_m: f64 = 0.25, in 0.02..=2.0, "m";
         /// Height above the ground up to which a return is an obstacle. What is higher hangs
         /// over the road, and rays that pass higher free nothing.
