@@ -235,6 +235,7 @@ fn fill_list(list: &mut ObjectList, heading: &Heading<'_>, objects: &[Object], o
     let mut messages = std::mem::take(&mut list.objects.0);
     messages.clear();
     messages.extend(objects.iter().map(message));
+    let reference = heading.sweep.reference;
     *list = ObjectList {
         revolution: heading.revolution,
         frame: heading.sweep.frame.number(),
@@ -247,6 +248,8 @@ fn fill_list(list: &mut ObjectList, heading: &Heading<'_>, objects: &[Object], o
         omitted: omitted as u32,
         processing_time: heading.processing_s,
         objects: List(messages),
+        reference_latitude: reference.map_or(0.0, |place| place.latitude_deg),
+        reference_longitude: reference.map_or(0.0, |place| place.longitude_deg),
     };
 }
 

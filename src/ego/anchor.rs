@@ -147,6 +147,12 @@ impl Anchoring {
         self.variance_rad2 += UNKNOWN_TURN_RAD * UNKNOWN_TURN_RAD;
     }
 
+    /// The local frame is another one, in which a pose is what `anew` says; the sensor is where it is.
+    pub(super) fn reframe(&mut self, odometry: &Pose, anew: impl Fn(&Pose) -> Pose) {
+        let here = self.anchor.pose(odometry);
+        self.anchor = Anchor::between(odometry, &anew(&here));
+    }
+
     pub(super) fn anchor(&self) -> (Frame, Anchor) {
         (self.frame, self.anchor)
     }

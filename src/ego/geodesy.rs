@@ -95,6 +95,23 @@ impl LocalFrame {
         (self.axes * (place.to_earth() - self.origin)).into()
     }
 
+    /// Where the frame lies.
+    pub fn reference(&self) -> Geodetic {
+        Geodetic::from_earth(self.origin)
+    }
+
+    /// How far north at a place is turned counter-clockwise from the frame's north: meridians converge.
+    pub fn north_turn_rad(&self, place: Geodetic) -> f64 {
+        let [_, north, _] = Self::around(place).rows();
+        let [east, ahead, _]: [f64; 3] = (self.axes * north).into();
+        libm::atan2(-east, ahead)
+    }
+
+    /// East, north and up in the frame that turns with the earth.
+    fn rows(&self) -> [Vector3<f64>; 3] {
+        [0, 1, 2].map(|row| self.axes.row(row).transpose())
+    }
+
     /// The place so many metres east, north and up.
     pub fn geodetic(&self, local_m: [f64; 3]) -> Geodetic {
         Geodetic::from_earth(self.origin + self.axes.transpose() * Vector3::from(local_m))
@@ -110,6 +127,32 @@ mod tests {
         longitude_deg: 11.97,
         altitude_m: 50.0,
     };
+
+    #[test]
+    fn north_turns_with_the_longitude_times_the_sine_of_the_latitude() {
+        let frame = LocalFrame::around(CHALMERS);
+        let east = Geodetic {
+            longitude_deg: CHALMERS.longitude_deg + 1.6,
+            ..CHALMERS
+        };
+        let expected_deg = 1.6 * CHALMERS.latitude_deg.to_radians().sin();
+        // Seen from the west, meridians to the east lean to the west.
+        assert!((frame.north_turn_rad(east).to_degrees() - expected_deg).abs() < 0.02);
+        assert!(frame.north_turn_rad(CHALMERS).abs() < 1e-12);
+    }
+
+    #[test]
+    fn places_keep_their_millimetre_over_a_thousand_kilometres() {
+        let frame = LocalFrame::around(CHALMERS);
+        let far_m = [1e6, -3e5, -8e4];
+        let back_m = frame.local_m(frame.geodetic(far_m));
+        assert!(
+            (0..3).all(|axis| (back_m[axis] - far_m[axis]).abs() < 1e-3),
+            "{back_m:?}"
+        );
+        let reference = frame.reference();
+        assert!((reference.latitude_deg - CHALMERS.latitude_deg).abs() < 1e-9);
+    }
 
     #[test]
     fn a_degree_is_as_long_as_on_the_ellipsoid() {

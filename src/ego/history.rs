@@ -63,6 +63,13 @@ impl<T: Blend> History<T> {
         self.values.drain(..old);
     }
 
+    /// Says all values anew.
+    pub(super) fn restate(&mut self, anew: impl Fn(&T) -> T) {
+        for (_, value) in &mut self.values {
+            *value = anew(value);
+        }
+    }
+
     /// Notes at the end of a revolution how far its clock is behind.
     pub(super) fn note_lag(&mut self, end: Time) {
         let newest = self.last().map(|(newest, _)| newest);

@@ -251,6 +251,10 @@ impl Ego {
             return self.sources.sweep(begin, end);
         }
         let middle = scan.time() + Span::from_seconds(-0.5 * scan.duration_s());
+        if let (Some(anew), Some(anchoring)) = (self.sources.recentre(middle), &mut self.anchoring)
+        {
+            anchoring.reframe(&Pose::of(&self.odometry.pose()), anew);
+        }
         let heard = self.sources.best(middle);
         self.source = heard.map(|(source, _)| source);
         let sensor = heard.map(|(source, vehicle)| (source, self.parameters.sensor(&vehicle)));
@@ -343,6 +347,7 @@ impl Ego {
             .map_or((Frame::Odometry, Anchor::IDENTITY), Anchoring::anchor);
         Sweep {
             frame,
+            reference: self.sources.reference().filter(|_| frame == Frame::Earth),
             epoch: self.epoch.wrapping_add(self.odometry.epoch()),
             vehicle: Some(self.parameters.vehicle(&anchor.pose(&sensor))),
             sensor,

@@ -7,7 +7,7 @@ use super::reading::{Direction, Reading, Source};
 use super::senders::Senders;
 use super::sweep::KNOTS;
 use super::trust::Trust;
-use super::{Anchor, EgoParameters, HeadingUnit, Heard, Pose, Sweep, wrapped_rad};
+use super::{Anchor, EgoParameters, Frame, HeadingUnit, Heard, Pose, Sweep, wrapped_rad};
 use crate::time::{Span, Time};
 use crate::wire::{Envelope, WireError};
 
@@ -17,6 +17,8 @@ pub(super) struct Sources {
     parameters: EgoParameters,
     local: Option<LocalFrame>,
     heading_unit: HeadingUnit,
+    /// How far north is turned where the vehicle was last, against the local frame's.
+    north_turn_rad: f64,
     applanix: History<Pose>,
     geolocation: History<Pose>,
     places: History<[f64; 3]>,
@@ -74,6 +76,7 @@ impl Sources {
                 .fixed_reference
                 .then(|| LocalFrame::around(reference)),
             heading_unit: parameters.heading_unit,
+            north_turn_rad: 0.0,
             parameters: parameters.clone(),
             applanix: History::default(),
             geolocation: History::default(),
@@ -184,8 +187,8 @@ impl Sources {
     fn take(&mut self, time: Time, reading: Reading) {
         match reading {
             Reading::Fix(source, place, direction) => {
-                let yaw_rad = self.yaw_rad(direction);
                 let position_m = self.local_m(place);
+                let yaw_rad = self.yaw_rad(direction);
                 self.push_pose(
                     source,
                     time,
@@ -278,10 +281,54 @@ impl Sources {
         }
     }
 
+    /// Where a place lies in the local frame; headings after it are those at the place.
     fn local_m(&mut self, place: Geodetic) -> [f64; 3] {
-        self.local
-            .get_or_insert_with(|| LocalFrame::around(place))
-            .local_m(place)
+        let local = self.local.get_or_insert_with(|| LocalFrame::around(place));
+        self.north_turn_rad = local.north_turn_rad(place);
+        local.local_m(place)
+    }
+
+    /// Where the local frame lies, if anything was heard of the earth.
+    pub(super) fn reference(&self) -> Option<Geodetic> {
+        self.local.as_ref().map(LocalFrame::reference)
+    }
+
+    /// Lays the local frame around where the vehicle is, if that is far from its reference and the reference is not
+    /// configured. Gives how poses are to be said anew.
+    pub(super) fn recentre(&mut self, time: Time) -> Option<impl Fn(&Pose) -> Pose + use<>> {
+        /// Within this the earth is flat to 8 m of height and 0.1 degrees.
+        const FARTHEST_M: f64 = 10_000.0;
+        let before = self.local.filter(|_| !self.parameters.fixed_reference)?;
+        let (source, vehicle) = self.best(time)?;
+        let [east_m, north_m, _] = vehicle.position_m;
+        if source.frame() != Frame::Earth || libm::hypot(east_m, north_m) < FARTHEST_M {
+            return None;
+        }
+        let now = LocalFrame::around(before.geodetic(vehicle.position_m));
+        self.local = Some(now);
+        let anew = move |pose: &Pose| {
+            let place = before.geodetic(pose.position_m);
+            let turn_rad = now.north_turn_rad(place) - before.north_turn_rad(place);
+            Pose {
+                position_m: now.local_m(place),
+                yaw_rad: wrapped_rad(pose.yaw_rad + turn_rad),
+            }
+        };
+        self.applanix.restate(anew);
+        self.geolocation.restate(anew);
+        let there = anew(&vehicle);
+        let turn_rad = there.yaw_rad - vehicle.yaw_rad;
+        self.headings
+            .restate(|Yaw(yaw_rad)| Yaw(wrapped_rad(yaw_rad + turn_rad)));
+        self.places.restate(|position_m| {
+            let pose = Pose {
+                position_m: *position_m,
+                yaw_rad: 0.0,
+            };
+            anew(&pose).position_m
+        });
+        self.trusts = Default::default();
+        Some(anew)
     }
 
     /// Radians lie within half a turn to either side of north, degrees within a whole one.
@@ -300,7 +347,7 @@ impl Sources {
                 self.heading_unit = HeadingUnit::Radians;
             }
         }
-        direction.yaw_rad(self.heading_unit)
+        wrapped_rad(direction.yaw_rad(self.heading_unit) + self.north_turn_rad)
     }
 
     /// The vehicle's pose from one source.
@@ -351,6 +398,7 @@ impl Sources {
         });
         Sweep {
             frame: source.frame(),
+            reference: self.reference(),
             epoch: self.epoch,
             vehicle: Some(vehicle),
             sensor: self.parameters.sensor(&vehicle),
@@ -358,5 +406,67 @@ impl Sources {
             knots,
             anchor: Anchor::IDENTITY,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parameter::Profile;
+
+    fn sources(fixed_reference: bool) -> Sources {
+        Sources::new(&EgoParameters {
+            fixed_reference,
+            reference_latitude_deg: 57.7,
+            reference_longitude_deg: 11.9,
+            ..EgoParameters::profile(Profile::Default)
+        })
+    }
+
+    /// Drives east along a parallel, and gives when it is at a longitude.
+    fn drive(sources: &mut Sources, longitudes_deg: [f64; 2]) -> Time {
+        let mut time = Time::from_micros(1_000_000);
+        for (step, longitude_deg) in longitudes_deg.into_iter().enumerate() {
+            time = Time::from_micros(1_000_000 + 10_000 * step as i64);
+            let place = Geodetic {
+                latitude_deg: 57.7,
+                longitude_deg,
+                altitude_m: 50.0,
+            };
+            let heading = Direction::Degrees(90.0);
+            sources.take(time, Reading::Fix(Source::Applanix, place, heading));
+        }
+        time
+    }
+
+    #[test]
+    fn the_local_frame_follows_who_goes_far_and_everything_stays_where_it_is() {
+        let mut sources = sources(false);
+        let time = drive(&mut sources, [11.9, 13.5]);
+        let before = sources.pose_from(Source::Applanix, time).unwrap();
+        // East at the far place is not east in the frame around the near one.
+        assert!(
+            (before.yaw_rad.to_degrees() - 1.35).abs() < 0.01,
+            "{before:?}"
+        );
+        let place = sources.local.unwrap().geodetic(before.position_m);
+        let anew = sources.recentre(time).expect("another frame");
+        let after = sources.pose_from(Source::Applanix, time).unwrap();
+        assert!(after.yaw_rad.abs() < 1e-9, "{after:?}");
+        let again = sources.local.unwrap().local_m(place);
+        for axis in 0..3 {
+            assert!((after.position_m[axis] - again[axis]).abs() < 1e-3);
+            assert!((anew(&before).position_m[axis] - again[axis]).abs() < 1e-3);
+        }
+        assert!(sources.recentre(time).is_none());
+        let reference = sources.reference().unwrap();
+        assert!((reference.longitude_deg - 13.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_configured_reference_stays() {
+        let mut sources = sources(true);
+        let time = drive(&mut sources, [13.49, 13.5]);
+        assert!(sources.recentre(time).is_none());
     }
 }

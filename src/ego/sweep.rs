@@ -1,5 +1,6 @@
 //! Where the sensor is while it turns once.
 
+use super::geodesy::Geodetic;
 use super::{Anchor, Placement, Pose};
 use crate::geometry::Rigid;
 
@@ -31,6 +32,8 @@ impl Frame {
 pub struct Sweep {
     /// The frame that states are published in.
     pub frame: Frame,
+    /// The WGS84 reference around which it lies, if it lies on the earth.
+    pub reference: Option<Geodetic>,
     /// Where the odometry frame lies in it.
     pub anchor: Anchor,
     /// Counts how often the odometry frame began anew: poses of different epochs cannot be compared.
@@ -53,6 +56,7 @@ impl Sweep {
     pub const fn still(epoch: u32) -> Self {
         Self {
             frame: Frame::Odometry,
+            reference: None,
             anchor: Anchor::IDENTITY,
             epoch,
             vehicle: None,

@@ -78,5 +78,10 @@ super::message! {
         10 => processing_time: f32,
         /// The objects, each with its length before it.
         11 => objects: List<Object>,
+        /// Where frame 1 lies, degrees north; 0 in another frame. It lies around another place when the vehicle is 10 km
+        /// away, unless it is configured; ids go on.
+        12 => reference_latitude: f64,
+        /// Degrees east.
+        13 => reference_longitude: f64,
     }
 }
