@@ -10,7 +10,8 @@ use kreisel::simulate::{Simulation, Truth, scenario};
 use kreisel::time::{Span, Time};
 use kreisel::wire::envelope::Postmark;
 use kreisel::wire::point_cloud::{CompactPointCloud, POINT_CLOUD_ID};
-use kreisel::wire::{Envelope, Recording};
+use kreisel::wire::pose::ApplanixGroup1;
+use kreisel::wire::{Envelope, Message, Recording};
 
 /// Frames of a simulated revolution, and where the sensor was at its end.
 struct Turn {
@@ -136,6 +137,64 @@ fn a_dropout_of_poses_is_bridged_in_the_same_frame_and_map() {
     println!("{worst_m:.3} m off at most");
     assert!(worst_m < 0.3, "{worst_m}");
     assert!(maps.iter().all(|map| *map == maps[0]));
+}
+
+/// The same pose message of another sender, stamped later, and moved east.
+fn posed(frame: &[u8], sender_stamp: u32, later: Span, east_m: f64) -> Vec<u8> {
+    let envelope = envelope(frame);
+    let mut fix = ApplanixGroup1::decode(envelope.payload, 0).unwrap();
+    fix.lon += east_m / 60_000.0;
+    let mut out = vec![];
+    let postmark = Postmark {
+        sent: envelope.sent.time() + later,
+        sampled: envelope.sample_time_stamp.time() + later,
+        sender_stamp,
+    };
+    postmark.put(&mut out, &fix);
+    out
+}
+
+#[test]
+fn faulty_poses_are_told_and_cost_neither_map_nor_place() {
+    type Faulty = fn(&[u8]) -> Vec<Vec<u8>>;
+    let cases: [(&str, Faulty); 3] = [
+        ("pose_other_sender", |frame| {
+            vec![frame.to_vec(), posed(frame, 2, Span::default(), 1.2)]
+        }),
+        ("pose_clock", |frame| {
+            vec![posed(frame, 0, Span::from_seconds(-3600.0), 0.0)]
+        }),
+        ("", |frame| {
+            vec![posed(frame, 0, Span::from_seconds(-0.8), 0.0)]
+        }),
+    ];
+    let turns = drive("street", 6, 80);
+    for (name, faulty) in cases {
+        let mut pipeline = pipeline();
+        let (mut maps, mut places_m) = (vec![], vec![]);
+        for turn in &turns {
+            for frame in turn.poses.iter().flat_map(|frame| faulty(frame)) {
+                // What is wrong with it is counted.
+                let _ = pipeline.handle(&envelope(&frame));
+            }
+            let report = answer(&mut pipeline, &turn.clouds[0]);
+            assert_eq!((report.ego.restarts, report.ego.jumps), (0, 0), "{name}");
+            pipeline.update_map();
+            maps.push(pipeline.grid().map_id());
+            places_m.push(place_m(&report));
+        }
+        assert!(maps.iter().all(|map| *map == maps[0]), "{name}");
+        let counted = pipeline.counts().faults.get(name);
+        assert_eq!(counted > 500, !name.is_empty(), "{name}: {counted}");
+        let late_s = pipeline.status().pose_clock_behind;
+        assert_eq!(late_s > 0.5, name.is_empty(), "{name}: {late_s}");
+        let met: Vec<&Turn> = turns[10..].iter().collect();
+        let [truly, found] = ways_m(&met, &places_m[10..]);
+        assert!(
+            distance_m(truly, found) < 0.3,
+            "{name}: {truly:?} {found:?}"
+        );
+    }
 }
 
 /// A revolution with nothing in it, at the time of another.

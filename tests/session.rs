@@ -499,3 +499,35 @@ fn missed_revolutions_are_counted_and_make_it_degraded() {
         assert!(!status.healthy);
     });
 }
+
+#[test]
+#[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
+fn a_recording_keeps_all_that_came_before_its_terminal_went_and_says_what_it_misses() {
+    in_namespace(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("recorded.rec");
+        let recorder =
+            Running::kreisel(&["record", text(&path), "--cid=111", "--interface=127.0.0.1"]);
+        await_true("the recorder", || {
+            let sockets = std::fs::read_to_string("/proc/thread-self/net/udp").unwrap();
+            sockets.contains(":2F8F")
+        });
+        let peer = Peer::join();
+        let revolutions = revolutions(3);
+        revolutions
+            .iter()
+            .for_each(|revolution| peer.send(revolution));
+        peer.send(b"no envelope");
+        let length: usize = revolutions.iter().map(Vec::len).sum();
+        let written = || std::fs::metadata(&path).is_ok_and(|file| file.len() == length as u64);
+        await_true("what it has flushed", written);
+        recorder.signal(Signal::SIGHUP);
+        let (code, _, log) = recorder.output();
+        assert_eq!(code, 3, "{log}");
+        assert!(
+            log.contains("3 envelopes written, 1 damaged datagrams left out, 0 lost"),
+            "{log}"
+        );
+        assert!(std::fs::read(&path).unwrap() == revolutions.concat());
+    });
+}
