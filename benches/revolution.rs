@@ -47,24 +47,56 @@ fn at_time(frame: &[u8], round: usize) -> Vec<u8> {
     frame_of(&cloud, time_of(round))
 }
 
-/// 2,000 columns of 16 returns at all distances, none of them ground.
-fn worst(rounds: usize) -> Vec<Vec<u8>> {
-    let distance = |n: u32| match n % 16 {
+/// A distance by the number of its return.
+type Distance = fn(u32) -> u32;
+
+/// Distances in centimetres of 2,000 columns of 16 returns that cost much, by the number of the return.
+const COSTLY: [(&str, Distance); 4] = [
+    // Returns at all distances, none of them ground.
+    ("worst", |n| match n % 16 {
         layer if layer < 8 => 100 + layer,
         _ => 300 + n * 7919 % 2000,
-    };
-    let distances: Vec<u8> = (0..2000 * 16)
-        .flat_map(|n| (distance(n) as u16).to_be_bytes())
-        .collect();
-    let cloud = CompactPointCloud {
-        start_azimuth_deg: 0.1,
-        end_azimuth_deg: 359.92,
-        layers: 16,
-        distances: &distances,
-        ..CompactPointCloud::default()
+    }),
+    // Flakes on every ray.
+    ("snow", |n| 200 + mixed(n) % 400),
+    // Flakes on three rays of ten, before walls.
+    ("snowfall", |n| {
+        if mixed(n) % 10 < 3 {
+            200 + mixed(n) / 10 % 400
+        } else {
+            2500
+        }
+    }),
+    // A spiral: every column is a little farther than the one before.
+    ("spiral", |n| 150 + n / 16 % 2000),
+];
+
+/// A number of which nothing is left of what it was.
+fn mixed(n: u32) -> u32 {
+    let n = (n ^ (n >> 16)).wrapping_mul(0x045d_9f3b);
+    let n = (n ^ (n >> 16)).wrapping_mul(0x045d_9f3b);
+    n ^ (n >> 16)
+}
+
+fn costly(distance: Distance, rounds: usize) -> Vec<Vec<u8>> {
+    let revolution = |round: usize| -> Vec<u8> {
+        let first = (round * 2000 * 16) as u32;
+        (first..first + 2000 * 16)
+            .flat_map(|n| (distance(n) as u16).to_be_bytes())
+            .collect()
     };
     (0..rounds)
-        .map(|round| frame_of(&cloud, time_of(round)))
+        .map(|round| {
+            let distances = revolution(round);
+            let cloud = CompactPointCloud {
+                start_azimuth_deg: 0.1,
+                end_azimuth_deg: 359.92,
+                layers: 16,
+                distances: &distances,
+                ..CompactPointCloud::default()
+            };
+            frame_of(&cloud, time_of(round))
+        })
         .collect()
 }
 
@@ -117,7 +149,9 @@ fn main() {
     if is_wanted("street") {
         bench("street", &street(rounds), &reaches_m);
     }
-    if is_wanted("worst") {
-        bench("worst", &worst(rounds.min(WARM + 50)), &reaches_m);
+    for (name, distance) in COSTLY {
+        if is_wanted(name) {
+            bench(name, &costly(distance, rounds.min(WARM + 50)), &reaches_m);
+        }
     }
 }

@@ -91,6 +91,10 @@ pub struct Counts {
     pub poses: u64,
     /// Sound poses that are of no use: of other senders, other clocks, or without a fix.
     pub poses_refused: u64,
+    /// Returns that hung in the air.
+    pub airborne: u64,
+    /// Revolutions that had some.
+    pub airborne_revolutions: u64,
     /// Revolutions that were not answered between two that were.
     pub missed: u64,
     /// Revolutions that kept the last good plane.

@@ -313,6 +313,7 @@ impl Pipeline {
             dialect,
             columns: self.scan.columns(),
             rotation_hz: self.scan.rotation_hz(),
+            airborne: self.scan.airborne_returns(),
             returns: self.scan.returns(),
             ground,
             vehicle: sweep.vehicle,
@@ -322,6 +323,8 @@ impl Pipeline {
             objects: self.objects.len(),
         };
         self.counts.missed += report.missed;
+        self.counts.airborne += report.airborne as u64;
+        self.counts.airborne_revolutions += u64::from(report.airborne > 0);
         self.counts.time_jumps += u64::from(report.time_jumped);
         self.counts.ground_held += u64::from(ground.origin == Origin::Held);
         self.counts.ground_fallback += u64::from(ground.origin == Origin::Fallback);
@@ -445,6 +448,7 @@ impl Pipeline {
             revolutions_refused: self.counts.refused,
             datagrams_damaged: self.counts.damaged,
             revolutions_missed: self.counts.missed,
+            airborne_returns: self.counts.airborne,
             packets_received: self.counts.packets,
             packets_lost: self.counts.packets_lost,
             packets_late: self.counts.packets_late,

@@ -74,6 +74,8 @@ pub struct RevolutionReport {
     pub columns: usize,
     /// Revolutions a second, from the step between columns.
     pub rotation_hz: f64,
+    /// Returns that are not used because they hang in the air.
+    pub airborne: usize,
     /// Points with a return that is used.
     pub returns: usize,
     /// The ground.

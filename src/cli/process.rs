@@ -249,6 +249,10 @@ impl Process<'_> {
                 counts.ground_fallback,
                 "before any plausible ground plane: it was taken level at the configured height",
             ),
+            (
+                counts.airborne_revolutions,
+                "with snow, rain, spray or dust: what stood alone near the sensor was left out",
+            ),
             (counts.time_jumps, "after a jump in time: tracks began anew"),
         ] {
             if count > 0 {

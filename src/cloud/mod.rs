@@ -2,8 +2,10 @@
 //!
 //! `dialect` finds what the message does not say (byte order) and what it says in two ways
 //! (intensity, unit). `intake` decides whether the message is one whole revolution that the
-//! array can hold, `refusal` says why not. `scan` is the array, `passes` fills it, `own_vehicle` masks part of it.
+//! array can hold, `refusal` says why not. `scan` is the array, `passes` fills it, `airborne` leaves out what hangs in the air, `own_vehicle` masks part of it.
 //! `sensor` has the elevation tables. `packets` puts revolutions together from what a sensor itself sends.
+
+mod airborne;
 
 mod dialect;
 
@@ -89,6 +91,8 @@ parameters! {
         /// Whether what is seen of the own vehicle is learned and dropped: what is of one piece with what is
         /// within 1.3 m of the sensor, and keeps its place there for a second.
         own_vehicle: bool = true, thesis false, "";
+        /// Whether returns within 15 m with nothing beside them are dropped where they are many: snow, rain, spray, dust.
+        airborne: bool = true, thesis false, "";
         /// Box around the own vehicle, instead of what is learned of it, in the sensor frame (x right, y forward, z up), within
         /// which returns are dropped: lowest x. The box is empty where low is not below high.
         vehicle_x_low_m: f64 = 0.0, in -10.0..=10.0, "m";

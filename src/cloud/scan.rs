@@ -1,5 +1,6 @@
 //! The static array of points that every later step reads.
 
+use super::airborne::Airborne;
 use super::passes::{self, Coordinates};
 use super::sensor::{self, Sensor};
 use super::{CloudParameters, OwnVehicle, Revolution, Source, Turn};
@@ -46,6 +47,9 @@ pub struct Scan {
     farthest_m: Vec<f32>,
     /// Where the source says it.
     reflectivity: Vec<u8>,
+    airborne: Airborne,
+    /// Returns that were left out because they hang in the air.
+    airborne_returns: usize,
     x_m: Box<[f32]>,
     y_m: Box<[f32]>,
     z_m: Box<[f32]>,
@@ -116,6 +120,8 @@ impl Default for Scan {
             range_m: zeros(),
             farthest_m: vec![],
             reflectivity: vec![],
+            airborne: Airborne::default(),
+            airborne_returns: 0,
             x_m: zeros(),
             y_m: zeros(),
             z_m: zeros(),
@@ -157,6 +163,12 @@ impl Scan {
                 self.read_turn(turn, revolution.dialect.unit_m, kept_m);
                 Some(turn.laser_turns_deg())
             }
+        };
+        let ranges_m = &mut self.range_m.as_chunks_mut().0[..self.columns];
+        self.airborne_returns = if parameters.airborne {
+            self.airborne.mask(ranges_m)
+        } else {
+            0
         };
         self.place_points(laser_turns_deg);
         self.mask_vehicle(own, parameters);
@@ -419,6 +431,11 @@ impl Scan {
         } else {
             &self.farthest_m
         }
+    }
+
+    /// Returns that are not used because they hang in the air: snow, rain, spray, dust.
+    pub fn airborne_returns(&self) -> usize {
+        self.airborne_returns
     }
 
     /// Reflectivity of every return, up to 100 of diffuse surfaces and above of retroreflectors; empty where the

@@ -427,6 +427,12 @@ impl<'a> Worker<'a> {
                 });
             }
         }
+        if report.airborne > 0 {
+            let returns = report.airborne;
+            self.log.note("airborne", || {
+                format!("snow, rain, spray or dust: {returns} returns near the sensor left out")
+            });
+        }
         match report.ego.odometry.quality {
             Quality::Off | Quality::Begun | Quality::Following => {}
             Quality::Degenerate => self.log.note("odometry_degenerate", || {

@@ -454,9 +454,12 @@ mod tests {
         let after = sources.pose_from(Source::Applanix, time).unwrap();
         assert!(after.yaw_rad.abs() < 1e-9, "{after:?}");
         let again = sources.local.unwrap().local_m(place);
-        for axis in 0..3 {
-            assert!((after.position_m[axis] - again[axis]).abs() < 1e-3);
-            assert!((anew(&before).position_m[axis] - again[axis]).abs() < 1e-3);
+        for found in [after, anew(&before)] {
+            let both = found.position_m.into_iter().zip(again);
+            assert!(
+                both.into_iter()
+                    .all(|(found, again)| (found - again).abs() < 1e-3)
+            );
         }
         assert!(sources.recentre(time).is_none());
         let reference = sources.reference().unwrap();

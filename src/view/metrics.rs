@@ -135,6 +135,11 @@ fn families(status: &Status) -> Vec<Family> {
             "Revolutions that were not answered between two that were",
         ),
         counter(
+            "airborne_returns_total",
+            status.airborne_returns,
+            "Returns left out because they hang in the air",
+        ),
+        counter(
             "frames_not_sent_total",
             status.frames_not_sent,
             "Frames that could not be sent",

@@ -109,5 +109,7 @@ super::message! {
         51 => frames_not_sent: u64,
         /// Fragmented datagrams that the kernel could not put together, of the whole host.
         52 => fragmented_lost: u64,
+        /// Returns that were left out because they hang in the air: snow, rain, spray, dust.
+        53 => airborne_returns: u64,
     }
 }
