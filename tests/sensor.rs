@@ -174,8 +174,11 @@ fn a_flood_and_another_sensor_cost_no_packet() {
 #[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
 fn only_the_named_sensor_is_heard_on_the_named_interface() {
     in_namespace(|| {
-        let daemon =
-            Running::daemon(&["--velodyne", "--sensor=127.0.0.2", "--interface=127.0.0.1"]);
+        let daemon = Running::daemon(&[
+            "--velodyne",
+            "--sensor=127.0.0.2",
+            "--sensor-interface=127.0.0.1",
+        ]);
         let peer = Peer::join();
         let packets = packets(3);
         play(&host("127.0.0.1"), &packets[..20]);

@@ -17,12 +17,15 @@ pub(super) struct Arguments {
     /// The session: multicast group 225.0.0.CID, port 12175.
     #[arg(long, value_name = "N", required_unless_present = "velodyne", value_parser = clap::value_parser!(u8).range(1..=254))]
     cid: Option<u8>,
-    /// Address of the network interface to use [default: the routing table's choice].
+    /// Address of the network interface to use [default: the routing table's choice for a session, any for a sensor].
     #[arg(long, value_name = "IPV4")]
     interface: Option<Ipv4Addr>,
     /// Take the packets of a VLP-16 itself, from this UDP port [default: 2368].
     #[arg(long, value_name = "PORT", num_args = 0..=1, require_equals = true, default_missing_value = DEFAULT_PORT, value_parser = clap::value_parser!(u16).range(1..))]
     velodyne: Option<u16>,
+    /// Address of the network interface that its packets must come to, if it is not the session's [default: any].
+    #[arg(long, value_name = "IPV4", requires = "velodyne")]
+    sensor_interface: Option<Ipv4Addr>,
     /// Address of that VLP-16 [default: the first one that is heard].
     #[arg(long, value_name = "IPV4", requires = "velodyne")]
     sensor: Option<Ipv4Addr>,
@@ -45,11 +48,14 @@ const DEFAULT_PORT: &str = "2368";
 
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let interface = arguments.interface;
+    // Without a session there is one interface to speak of.
+    let alone = interface.filter(|_| arguments.cid.is_none());
+    let sensor_interface = arguments.sensor_interface.or(alone);
     let options = Options {
         session: arguments.cid.map(|cid| Session { cid, interface }),
         sensor: arguments.velodyne.map(|port| SensorPort {
             port,
-            interface,
+            interface: sensor_interface,
             address: arguments.sensor,
         }),
         publish_cloud: arguments.publish_cloud,

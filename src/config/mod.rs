@@ -27,8 +27,8 @@ parameters! {
         /// Share of the revolutions of the last 10 to 20 s that may be missed, by their time stamps, before the service says
         /// that it is degraded.
         most_missed_share: f64 = 0.05, in 0.0..=1.0, "";
-        /// Hosts whose point clouds and poses are taken, as "10.0.0.1, 10.0.0.2". If empty, of each message those of the
-        /// first host that sends a sound one, until it is silent for a second.
+        /// Hosts whose point clouds and poses are taken, as "10.0.0.1, 10.0.0.2". If empty, of each message and
+        /// senderStamp those of the first host that sends a sound one, until it is silent for a second.
         sources: Addresses = Addresses::default(), "";
     }
 }

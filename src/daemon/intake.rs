@@ -30,13 +30,24 @@ pub(super) struct Intake {
     sender_stamp: u32,
     /// Hosts that are listened to; any if there are none.
     sources: Vec<Ipv4Addr>,
-    /// Of each message the host that is listened to, and when it was heard last.
-    listened: Vec<(i32, Ipv4Addr, Instant)>,
+    /// Of each message and senderStamp the host that is listened to, and when it was heard last.
+    listened: Vec<Listened>,
     /// What the kernel had counted when something was dropped last.
     kernel: KernelCounts,
     /// Whether revolutions come from a sensor's own packets, and point clouds are none of ours.
     has_sensor: bool,
 }
+
+/// Whose messages of a number and senderStamp are taken.
+#[derive(Debug, Clone, Copy)]
+struct Listened {
+    message: (i32, u32),
+    host: Ipv4Addr,
+    heard: Instant,
+}
+
+/// Messages and senderStamps that are kept apart; a session has some ten.
+const MOST_LISTENED: usize = 64;
 
 impl Intake {
     pub(super) fn new(sender_stamp: u32, sources: &[Ipv4Addr], has_sensor: bool) -> Self {
@@ -94,7 +105,7 @@ impl Intake {
             });
         } else if !Pipeline::concerns(envelope.data_type) {
             trace!("message {} from {source} passed over", envelope.data_type);
-        } else if !self.listens_to(envelope.data_type, *source.ip()) {
+        } else if !self.listens_to((envelope.data_type, envelope.sender_stamp), *source.ip()) {
             self.faults.count("other_source");
             let data_type = envelope.data_type;
             self.log.note("other_source", || {
@@ -117,28 +128,40 @@ impl Intake {
         }
     }
 
-    /// Whether a host's messages of a number are taken: those of the hosts that are configured, else those of the first
-    /// one that is heard, until it is silent.
-    fn listens_to(&mut self, data_type: i32, host: Ipv4Addr) -> bool {
+    /// Whether a host's messages of a number and senderStamp are taken: those of the hosts that are configured, else
+    /// those of the first one that is heard, until it is silent.
+    fn listens_to(&mut self, message: (i32, u32), host: Ipv4Addr) -> bool {
         const SILENCE: Duration = Duration::from_secs(1);
         if !self.sources.is_empty() {
             return self.sources.contains(&host);
         }
-        let known = self.listened.iter_mut().find(|known| known.0 == data_type);
-        let Some((_, listened, heard)) = known else {
-            self.listened.push((data_type, host, Instant::now()));
+        let now = Listened {
+            message,
+            host,
+            heard: Instant::now(),
+        };
+        let known = self
+            .listened
+            .iter_mut()
+            .find(|known| known.message == message);
+        let Some(known) = known else {
+            if self.listened.len() == MOST_LISTENED {
+                self.listened.sort_unstable_by_key(|known| known.heard);
+                self.listened.remove(0);
+            }
+            self.listened.push(now);
             return true;
         };
-        if *listened != host {
-            if heard.elapsed() < SILENCE {
-                return false;
-            }
-            let before = std::mem::replace(listened, host);
+        if known.host != host && known.heard.elapsed() < SILENCE {
+            return false;
+        }
+        let before = std::mem::replace(known, now).host;
+        if before != host {
+            let (data_type, sender_stamp) = message;
             self.log.note("source_changed", || {
-                format!("message {data_type} comes from {host} now, and no more from {before}")
+                format!("message {data_type} of sender {sender_stamp} comes from {host} now, and no more from {before}")
             });
         }
-        *heard = Instant::now();
         true
     }
 
@@ -146,5 +169,34 @@ impl Intake {
         self.damaged += 1;
         self.faults.count(name);
         self.log.note(name, text);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const A: Ipv4Addr = Ipv4Addr::new(10, 0, 0, 1);
+    const B: Ipv4Addr = Ipv4Addr::new(10, 0, 0, 2);
+
+    #[test]
+    fn of_each_sender_one_host_is_listened_to() {
+        let mut intake = Intake::new(0, &[], false);
+        assert!(intake.listens_to((49, 0), A));
+        assert!(!intake.listens_to((49, 0), B));
+        // Another sensor may be at another host, and poses as well.
+        assert!(intake.listens_to((49, 1), B) && intake.listens_to((533, 0), B));
+        assert!(intake.listens_to((49, 0), A));
+        for sender_stamp in 0..1000 {
+            intake.listens_to((49, sender_stamp), B);
+        }
+        assert!(intake.listened.len() <= MOST_LISTENED);
+    }
+
+    #[test]
+    fn hosts_that_are_configured_are_the_only_ones() {
+        let mut intake = Intake::new(0, &[B], false);
+        assert!(!intake.listens_to((49, 0), A));
+        assert!(intake.listens_to((49, 0), B));
     }
 }
