@@ -150,6 +150,7 @@ fn a_flood_and_another_sensor_cost_no_packet() {
                     garbage[..4].copy_from_slice(&number.to_le_bytes());
                     let length = [1206, 512, 0, 7][number as usize % 4];
                     let _ = hostile.send_to(&garbage[..length], "127.0.0.1:2368");
+                    let _ = hostile.send_to(&garbage[..length], "127.0.0.1:8308");
                     if number % 20 == 0 {
                         std::thread::sleep(Duration::from_millis(1));
                     }

@@ -1,12 +1,12 @@
 //! What comes in: counted, and the sound and useful into the queue.
 
-use tracing::trace;
-
 use std::net::Ipv4Addr;
 use std::time::{Duration, Instant};
 
+use tracing::trace;
+
 use super::fault_log::FaultLog;
-use super::kernel::KernelCounts;
+use super::kernel::Drops;
 use super::listener::{Arrival, Datagram};
 use super::queue::Queue;
 use crate::pipeline::{OWN_IDS, Pipeline};
@@ -23,7 +23,7 @@ pub(super) struct Intake {
     pub(super) datagrams: u64,
     pub(super) own: u64,
     pub(super) damaged: u64,
-    pub(super) kernel_dropped: u64,
+    pub(super) drops: Drops,
     pub(super) faults: Tally,
     log: FaultLog,
     /// senderStamp of what this daemon sends.
@@ -32,8 +32,6 @@ pub(super) struct Intake {
     sources: Vec<Ipv4Addr>,
     /// Of each message and senderStamp the host that is listened to, and when it was heard last.
     listened: Vec<Listened>,
-    /// What the kernel had counted when something was dropped last.
-    kernel: KernelCounts,
     /// Whether revolutions come from a sensor's own packets, and point clouds are none of ours.
     has_sensor: bool,
 }
@@ -54,7 +52,6 @@ impl Intake {
         Self {
             sender_stamp,
             sources: sources.to_vec(),
-            kernel: KernelCounts::read(),
             has_sensor,
             ..Self::default()
         }
@@ -63,21 +60,7 @@ impl Intake {
     /// Counts a datagram and queues it if it means anything to the pipeline.
     pub(super) fn hear(&mut self, datagram: &mut Datagram, arrival: &Arrival, queue: &mut Queue) {
         self.datagrams += 1;
-        if arrival.kernel_dropped > self.kernel_dropped {
-            let lost = arrival.kernel_dropped - self.kernel_dropped;
-            self.kernel_dropped = arrival.kernel_dropped;
-            let kernel = &mut self.kernel;
-            self.log.note("kernel_dropped", || {
-                let now = KernelCounts::read();
-                let wrong = now.since(kernel).checksums_wrong;
-                *kernel = now;
-                if wrong > 0 {
-                    format!("{lost} datagrams: the checksums of {wrong} on this host were wrong")
-                } else {
-                    format!("{lost} datagrams: the receive buffer was full")
-                }
-            });
-        }
+        self.drops.note(arrival, "datagrams", &mut self.log);
         if arrival.is_own {
             self.own += 1;
             return;

@@ -1,4 +1,7 @@
-//! What the kernel counts of datagrams that never reach a socket.
+//! What the kernel counts of datagrams that never reach this process.
+
+use super::fault_log::FaultLog;
+use super::listener::Arrival;
 
 /// Counts of this network namespace.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -36,6 +39,49 @@ impl KernelCounts {
             fragmented_lost: self.fragmented_lost.saturating_sub(before.fragmented_lost),
             checksums_wrong: self.checksums_wrong.saturating_sub(before.checksums_wrong),
         }
+    }
+}
+
+/// What the kernel dropped of what came to a socket.
+#[derive(Debug)]
+pub(super) struct Drops {
+    total: u64,
+    /// What was counted of the host when this was told last.
+    told: KernelCounts,
+}
+
+impl Default for Drops {
+    fn default() -> Self {
+        Self {
+            total: 0,
+            told: KernelCounts::read(),
+        }
+    }
+}
+
+impl Drops {
+    /// How many so far.
+    pub(super) fn total(&self) -> u64 {
+        self.total
+    }
+
+    /// Notes what a datagram says of those before it, and tells why they were dropped.
+    pub(super) fn note(&mut self, arrival: &Arrival, what: &str, log: &mut FaultLog) {
+        let lost = arrival.kernel_dropped.saturating_sub(self.total);
+        if lost == 0 {
+            return;
+        }
+        self.total = arrival.kernel_dropped;
+        let told = &mut self.told;
+        log.note("kernel_dropped", || {
+            let now = KernelCounts::read();
+            let wrong = now.since(told).checksums_wrong;
+            *told = now;
+            match wrong {
+                0 => format!("{lost} {what}: the receive buffer was full"),
+                _ => format!("{lost} {what}: the checksums of {wrong} on this host were wrong"),
+            }
+        });
     }
 }
 

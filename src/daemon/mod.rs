@@ -89,6 +89,9 @@ const COMFORTABLE_BUFFER_S: f64 = 2.0;
 /// Datagrams that are taken in before the next one is answered, however many more there are.
 const MOST_AT_ONCE: usize = 256;
 
+/// The same of packets that say the time.
+const MOST_POSITIONS_AT_ONCE: usize = 16;
+
 /// Runs the daemon until `stop` is ready.
 ///
 /// # Errors
@@ -286,6 +289,12 @@ impl Service<'_> {
             }
         }
         if let Some(sensor) = &mut self.sensor {
+            for _ in 0..MOST_POSITIONS_AT_ONCE {
+                let Some(arrival) = sensor.position_waiting(packet) else {
+                    break;
+                };
+                self.worker.take_packet(packet, &arrival);
+            }
             for _ in 0..MOST_AT_ONCE {
                 let Some(arrival) = sensor.receive_waiting(packet)? else {
                     break;

@@ -7,6 +7,7 @@ use nix::sys::socket::{setsockopt, sockopt};
 use socket2::{Domain, Protocol, Socket, Type};
 
 use super::fault_log::FaultLog;
+use super::kernel::Drops;
 use super::listener::{Arrival, Datagram, Listener};
 use crate::tally::Tally;
 use crate::wire::velodyne::POSITION_PORT;
@@ -46,7 +47,7 @@ pub(super) struct SensorPorts {
 #[derive(Debug, Default)]
 pub(super) struct SensorCounts {
     pub(super) datagrams: u64,
-    pub(super) kernel_dropped: u64,
+    pub(super) drops: Drops,
     pub(super) faults: Tally,
 }
 
@@ -108,7 +109,7 @@ impl SensorPorts {
         }
     }
 
-    /// The next packet if it has come already: those that say the time before the others.
+    /// The next data packet if it has come already.
     ///
     /// # Errors
     /// As [`Self::receive`].
@@ -117,21 +118,18 @@ impl SensorPorts {
         datagram: &mut Datagram,
     ) -> Result<Option<Arrival>, SensorError> {
         loop {
-            let told = self
-                .position
-                .as_mut()
-                .map(|position| position.receive_waiting(datagram));
-            let arrival = match told {
-                Some(Ok(Some(arrival))) => Some(arrival),
-                _ => {
-                    let arrival = self.data.receive_waiting(datagram);
-                    arrival.map_err(|error| self.lost(error))?
-                }
-            };
+            let arrival = self.data.receive_waiting(datagram);
+            let arrival = arrival.map_err(|error| self.lost(error))?;
             if arrival.is_none_or(|arrival| self.is_for_us(&arrival)) {
                 return Ok(arrival);
             }
         }
+    }
+
+    /// The next position packet if it has come already. They can be done without.
+    pub(super) fn position_waiting(&mut self, datagram: &mut Datagram) -> Option<Arrival> {
+        let arrival = self.position.as_mut()?.receive_waiting(datagram).ok()??;
+        self.is_for_us(&arrival).then_some(arrival)
     }
 
     fn lost(&self, error: io::Error) -> SensorError {
@@ -145,13 +143,9 @@ impl SensorPorts {
     /// Counts a datagram, and says whether it comes from where it should.
     fn is_for_us(&mut self, arrival: &Arrival) -> bool {
         self.counts.datagrams += 1;
-        if arrival.kernel_dropped > self.counts.kernel_dropped {
-            let lost = arrival.kernel_dropped - self.counts.kernel_dropped;
-            self.counts.kernel_dropped = arrival.kernel_dropped;
-            self.log.note("kernel_dropped", || {
-                format!("{lost} packets of the sensor: the receive buffer was full")
-            });
-        }
+        self.counts
+            .drops
+            .note(arrival, "packets of the sensor", &mut self.log);
         let source = arrival.source;
         let (is_expected, name) = if self
             .at

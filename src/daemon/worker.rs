@@ -264,8 +264,7 @@ impl<'a> Worker<'a> {
                 format!("{revolutions} revolutions so far: the pipeline is behind")
             });
         }
-        let kernel_dropped =
-            intake.kernel_dropped + sensor.map_or(0, |sensor| sensor.kernel_dropped);
+        let kernel_dropped = intake.drops.total() + sensor.map_or(0, |sensor| sensor.drops.total());
         self.vitals
             .dropped(revolutions + queue.dropped_others + kernel_dropped);
     }
@@ -283,7 +282,7 @@ impl<'a> Worker<'a> {
         if let Some(sensor) = sensor {
             faults.add(&sensor.faults);
             status.datagrams_received += sensor.datagrams;
-            status.datagrams_kernel_dropped += sensor.kernel_dropped;
+            status.datagrams_kernel_dropped += sensor.drops.total();
         }
         faults.count_many("queue_dropped_poses", queue.dropped_others);
         let latency = self.latency.percentiles();
@@ -293,7 +292,7 @@ impl<'a> Worker<'a> {
         status.revolutions_queue_dropped = queue.dropped_revolutions + self.replaced;
         status.datagrams_received += intake.datagrams;
         status.datagrams_own = intake.own;
-        status.datagrams_kernel_dropped += intake.kernel_dropped;
+        status.datagrams_kernel_dropped += intake.drops.total();
         status.datagrams_damaged += intake.damaged;
         status.faults = faults.to_string();
         status.latency_median = latency.median_s;

@@ -8,8 +8,8 @@ use crate::wire::velodyne::data::{
 /// Firings of a packet in which every pulse has one return.
 const MOST: usize = BLOCKS * FIRINGS_PER_BLOCK;
 
-/// Steps from firing to firing that a VLP-16 can make, in degrees: from 4 to 22 turns a second, and none is coarser than a hundredth of
-/// a degree allows.
+/// Steps from firing to firing that a VLP-16 can make, in degrees: from 4 to 22 turns a second, of blocks whose azimuths
+/// are rounded to 0.01.
 const STEPS_DEG: std::ops::RangeInclusive<f64> = 0.075..=0.45;
 
 /// The firings of a packet.

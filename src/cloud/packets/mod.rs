@@ -47,8 +47,6 @@ pub struct Taken {
     pub lost: u64,
     /// Whether it filled a gap that was left for it.
     pub is_late: bool,
-    /// Whether it says the time only.
-    pub is_position: bool,
     /// Whether a revolution that it closes, if it closes one, can be used.
     pub closed: Option<Result<(), Refusal>>,
 }
@@ -149,10 +147,7 @@ impl PacketIntake {
         self.follow_source(packet)?;
         if let Some(position) = PositionPacket::read(packet.bytes) {
             self.clock.hear(&position, packet.arrival);
-            return Ok(Taken {
-                is_position: true,
-                ..Taken::default()
-            });
+            return Ok(Taken::default());
         }
         let data = DataPacket::new(packet.bytes)?;
         let Some(sensor) = self.sensor_of(&data)? else {

@@ -9,7 +9,7 @@ use crate::wire::velodyne::data::{DataPacket, LASER_BY_LAYER, LASER_PERIOD_S, LA
 /// are made one.
 const MOST: usize = 2 * MAX_COLUMNS;
 
-/// Two returns nearer to each other than this are of one surface, and the mean of both is better than either.
+/// Two returns nearer to each other than 0.1 m, in units of 2 mm, are of one surface, and the mean of both is better than either.
 const ONE_SURFACE: u16 = 50;
 
 /// What came back of a firing, layers by rising elevation.
