@@ -1,5 +1,5 @@
-//! Kreisel takes each revolution of a Velodyne VLP-16 from an OpenDaVINCI or OpenDLV
-//! session and answers it with a list of the road users around the vehicle, and with what changed
+//! Kreisel takes each revolution of a Velodyne VLP-16, from an OpenDaVINCI or OpenDLV session or from
+//! the sensor's own packets, and answers it with a list of the road users around the vehicle, and with what changed
 //! in a map of everything else.
 //!
 //! A revolution walks through the house once, front to back:
@@ -17,7 +17,7 @@
 // Bytes to messages, messages to bytes.
 pub mod wire;
 
-// A message to the static array of points.
+// A message, or a sensor's packets, to the static array of points.
 pub mod cloud;
 
 // Boxes from above, places and directions in space.

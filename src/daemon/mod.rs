@@ -1,8 +1,9 @@
 //! The shell around the pipeline: a session on the network, a queue, a clock, one thread.
 //!
-//! `session` has the sockets of a session, `sensor` those of a sensor, both on a `listener`; `intake` sorts what comes, `queue` stands between it and
-//! `worker`, which owns the pipeline. `health` answers the container's health check, `latency`
-//! and `fault_log` keep figures and logs small. Everything is bounded.
+//! `session` has the sockets of a session, `sensor` those of a sensor, both on a `listener`; `intake` sorts what comes,
+//! `queue` stands between it and `worker`, which owns the pipeline. `route` and `kernel` notice what goes wrong before a
+//! datagram reaches a socket, `health` says how all is, `telling` and `fault_log` write the log, `latency` keeps
+//! figures. Everything is bounded.
 //!
 //! One thread does it all: while the pipeline works, the kernel's buffer takes what comes, and
 //! before the next revolution all of that goes into the queue. So nothing is locked, a
@@ -23,11 +24,13 @@ pub mod listener;
 
 mod queue;
 
+mod route;
+
 pub mod sensor;
 
 pub mod session;
 
-mod way;
+mod telling;
 
 mod worker;
 
@@ -47,9 +50,9 @@ use intake::Intake;
 use kernel::KernelCounts;
 use listener::Datagram;
 use queue::Queue;
+use route::Route;
 use sensor::{SensorError, SensorPort, SensorPorts};
 use session::{Receiver, Session, SessionError};
-use way::Way;
 use worker::{Output, Worker};
 
 /// What a user says on the command line about a daemon.
@@ -98,10 +101,10 @@ const MOST_POSITIONS_AT_ONCE: usize = 16;
 /// [`DaemonError`] when the session cannot be joined or the sensor not be heard, or when they are lost.
 pub async fn run(options: Options, stop: impl Future<Output = ()>) -> Result<(), DaemonError> {
     let parameters = &options.configuration.session;
-    let way = options
+    let route = options
         .session
         .as_ref()
-        .and_then(|session| Way::into(session).ok());
+        .and_then(|session| Route::to(session).ok());
     let joined = options
         .session
         .map(|session| session.join(parameters))
@@ -146,7 +149,7 @@ pub async fn run(options: Options, stop: impl Future<Output = ()>) -> Result<(),
         worker,
         session: options.session,
         parameters: parameters.clone(),
-        way,
+        route,
         kernel: KernelCounts::read(),
         vitals: &vitals,
     };
@@ -187,7 +190,7 @@ struct Service<'a> {
     session: Option<Session>,
     parameters: SessionParameters,
     /// How the session was joined.
-    way: Option<Way>,
+    route: Option<Route>,
     kernel: KernelCounts,
     vitals: &'a Vitals,
 }
@@ -234,24 +237,24 @@ impl Service<'_> {
         }
     }
 
-    /// Joins the session anew where the way to it is another one than it was: an interface came, went, was made anew or
+    /// Joins the session anew where the route to it is another one than it was: an interface came, went, was made anew or
     /// has another address.
     fn watch_network(&mut self) {
         let Some(session) = &self.session else { return };
-        let problem = match Way::into(session) {
-            Ok(way) if self.way == Some(way) => None,
-            Ok(way) => match session.join(&self.parameters) {
+        let problem = match Route::to(session) {
+            Ok(route) if self.route == Some(route) => None,
+            Ok(route) => match session.join(&self.parameters) {
                 Ok((receiver, sender)) => {
-                    match self.way {
+                    match self.route {
                         Some(before) => {
-                            warn!("joined the session anew over {way}: it was {before}")
+                            warn!("joined the session anew over {route}: it was {before}")
                         }
-                        None => warn!("joined the session anew over {way}"),
+                        None => warn!("joined the session anew over {route}"),
                     }
                     tell_joined(&receiver, self.parameters.ttl);
                     self.receiver = Some(receiver);
                     self.worker.set_sender(sender);
-                    self.way = Some(way);
+                    self.route = Some(route);
                     None
                 }
                 Err(error) => Some(error.to_string()),
@@ -259,7 +262,7 @@ impl Service<'_> {
             Err(error) => Some(error.to_string()),
         };
         if let Some(problem) = &problem
-            && self.way.take().is_some()
+            && self.route.take().is_some()
         {
             warn!("cut off from the session: {problem}");
         }

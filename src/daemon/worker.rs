@@ -1,8 +1,8 @@
-//! Jobs into answers: the pipeline, what its answers are sent with, and what is said of it.
+//! Jobs into answers: the pipeline, and what its answers are sent with.
 
 use std::time::Instant;
 
-use tracing::{debug, info, trace, warn};
+use tracing::{debug, info, trace};
 
 use super::fault_log::FaultLog;
 use super::health::{Health, Vitals};
@@ -13,10 +13,8 @@ use super::now;
 use super::queue::{Job, Queue};
 use super::sensor::SensorCounts;
 use super::session::Sender;
-use crate::cloud::{ClockState, Dialect, PacketRefusal};
-use crate::ego::EgoReport;
-use crate::ground::Origin;
-use crate::odometry::Quality;
+use super::telling::Teller;
+use crate::cloud::PacketRefusal;
 use crate::pipeline::{Fault, Outcome, Pipeline, RevolutionReport, Step};
 use crate::tally::Tally;
 use crate::time::Time;
@@ -25,7 +23,7 @@ use crate::wire::Envelope;
 use crate::wire::envelope::Postmark;
 use crate::wire::point_cloud::POINT_CLOUD_ID;
 use crate::wire::velodyne::Packet;
-use crate::wire::velodyne::data::{PACKET_LEN, ReturnMode};
+use crate::wire::velodyne::data::PACKET_LEN;
 use crate::wire::velodyne::device_service::SweepAssembler;
 
 /// Every so many Status messages the log says what the latency is.
@@ -44,25 +42,15 @@ pub(super) struct Worker<'a> {
     start: Instant,
     latency: Latency,
     statuses: u64,
-    told: Told,
-    ego: Option<EgoReport>,
+    teller: Teller,
     /// Revolutions of packets that were dropped because the next one was there.
     replaced: u64,
-    /// What was said of it last.
-    health: Health,
     dropped_revolutions: u64,
     fragmented_lost: u64,
     /// Frames that were not sent at the last Status.
     told_not_sent: u64,
     log: FaultLog,
     frame: Vec<u8>,
-}
-
-/// What was said of the sensor.
-#[derive(Debug, Default, PartialEq, Clone, Copy)]
-struct Told {
-    sensor: Option<(Dialect, usize)>,
-    clock: Option<(ClockState, Option<ReturnMode>)>,
 }
 
 /// Where answers go.
@@ -124,10 +112,8 @@ impl<'a> Worker<'a> {
             start: Instant::now(),
             latency: Latency::default(),
             statuses: 0,
-            told: Told::default(),
-            ego: None,
+            teller: Teller::default(),
             replaced: 0,
-            health: Health::Well,
             dropped_revolutions: 0,
             fragmented_lost: 0,
             told_not_sent: 0,
@@ -228,7 +214,8 @@ impl<'a> Worker<'a> {
             view.note(Step::Map);
             view.show(&self.pipeline, report, None);
         }
-        self.tell(report);
+        self.teller
+            .tell(report, self.pipeline.packets(), &mut self.log);
     }
 
     /// Sends into a session that was joined anew.
@@ -311,14 +298,7 @@ impl<'a> Worker<'a> {
         let health = self.vitals.verdict();
         status.healthy = health == Health::Well;
         status.health = health.to_string();
-        let is_new = std::mem::discriminant(&self.health) != std::mem::discriminant(&health);
-        if is_new {
-            match &health {
-                Health::Well => info!("health: ok"),
-                health => warn!("health: {health}"),
-            }
-            self.health = health;
-        }
+        self.teller.tell_health(health);
         if let Some(view) = &mut self.output.view {
             view.tell(&status);
         }
@@ -343,127 +323,6 @@ impl<'a> Worker<'a> {
     pub(super) fn log_latency(&self) {
         let (revolutions, latency) = (self.latency.revolutions(), self.latency.percentiles());
         info!("{revolutions} revolutions answered; from arrival to answer {latency}");
-    }
-
-    /// Says what changed.
-    fn tell(&mut self, report: &RevolutionReport) {
-        let Dialect {
-            byte_order,
-            byte_order_source,
-            unit_m,
-            intensity_bits,
-            ..
-        } = report.dialect;
-        let packets = self.pipeline.packets();
-        let told = Told {
-            sensor: Some((report.dialect, packets.firings_per_column())),
-            clock: packets.mode().map(|mode| (packets.clock(), Some(mode))),
-        };
-        let before = std::mem::replace(&mut self.told, told);
-        if before.sensor != told.sensor {
-            info!(
-                "{}: {} columns at {:.1} Hz{}, distances {} ({}), unit {} mm, {intensity_bits} bits of intensity",
-                report.sensor,
-                report.columns,
-                report.rotation_hz,
-                match packets.firings_per_column() {
-                    1 => "",
-                    _ => ", each of two firings",
-                },
-                byte_order.name(),
-                byte_order_source.name(),
-                1000.0 * unit_m,
-            );
-        }
-        if let Some(mode) = packets.mode().filter(|_| before.clock != told.clock) {
-            let ahead_s = packets.clock_ahead().seconds();
-            let mode = mode.name();
-            match packets.clock() {
-                ClockState::Free => info!(
-                    "{mode}; no GPS receiver keeps the sensor's clock: revolutions have the time of their arrival"
-                ),
-                ClockState::Configured => {
-                    info!("{mode}; revolutions have the time of their arrival, as configured")
-                }
-                ClockState::Synchronised => info!(
-                    "{mode}; revolutions have the sensor's time, which is {ahead_s:.3} s ahead of this computer's"
-                ),
-                ClockState::Apart => warn!(
-                    "{mode}; the sensor's time is {ahead_s:.0} s ahead of this computer's: revolutions have that of their arrival"
-                ),
-            }
-        }
-        if report.time_jumped {
-            self.log.note("time_jump", || {
-                format!("to {:.3} s: tracks begin anew", report.time.seconds())
-            });
-        }
-        if let Some(last) = self.ego.replace(report.ego) {
-            if last.source != report.ego.source {
-                info!("poses: {}", report.ego.source);
-            }
-            if last.jumps != report.ego.jumps {
-                let source = report.ego.source;
-                self.log.note("pose_jump", || {
-                    format!("{source} jumped: the local frame is tied to the odometry anew")
-                });
-            }
-            let is_behind = |ego: &EgoReport| ego.behind_s != 0.0;
-            if !is_behind(&last) && is_behind(&report.ego) {
-                let behind_s = report.ego.behind_s;
-                self.log.note("pose_behind", || {
-                    format!("poses are stamped {behind_s:.2} s behind the revolutions, which is made up for")
-                });
-            }
-            if let Some(name) = report.ego.distrusted.filter(|_| last.distrusted.is_none()) {
-                self.log.note("pose_disagrees", || {
-                    format!("{name} does not go as the sensor does: it is not used")
-                });
-            }
-            if last.restarts != report.ego.restarts {
-                self.log.note("odometry_restart", || {
-                    "what is seen did not fit for too long: a new map begins".into()
-                });
-            }
-        }
-        if report.airborne > 0 {
-            let returns = report.airborne;
-            self.log.note("airborne", || {
-                format!("snow, rain, spray or dust: {returns} returns near the sensor left out")
-            });
-        }
-        match report.ego.odometry.quality {
-            Quality::Off | Quality::Begun | Quality::Following => {}
-            Quality::Degenerate => self.log.note("odometry_degenerate", || {
-                format!(
-                    "what is seen tells the place to {:.1} m only: prediction and poses ({}) tell the rest",
-                    report.ego.odometry.deviation_m, report.ego.source
-                )
-            }),
-            Quality::Lost => self.log.note("odometry_lost", || {
-                "what is seen does not fit what was seen before".into()
-            }),
-        }
-        match report.ground.origin {
-            Origin::Found => {}
-            Origin::Held => self.log.note("ground_held", || {
-                "no plausible ground plane: the last one is kept".into()
-            }),
-            Origin::Fallback => self.log.note("ground_fallback", || {
-                format!(
-                    "no plausible ground plane yet: taken {} m below the sensor",
-                    report.ground.plane.height_m()
-                )
-            }),
-        }
-        trace!(
-            "revolution {}: {} returns, ground {:.2} m below, {} clusters, {} objects",
-            report.number,
-            report.returns,
-            report.ground.plane.height_m(),
-            report.clusters,
-            report.objects,
-        );
     }
 }
 

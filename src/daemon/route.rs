@@ -1,4 +1,4 @@
-//! The way into a session: through which interface, from which address.
+//! The route into a session: through which interface, from which address.
 
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
@@ -10,23 +10,23 @@ use super::session::Session;
 
 /// Where a session is joined. An interface that is made anew has another number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Way {
+pub(super) struct Route {
     address: Ipv4Addr,
     interface: u32,
 }
 
-impl std::fmt::Display for Way {
+impl std::fmt::Display for Route {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} (interface {})", self.address, self.interface)
     }
 }
 
-impl Way {
-    /// The way that joining takes now: over the named interface, else the routing table's choice, else loopback.
+impl Route {
+    /// The route that joining takes now: over the named interface, else the routing table's choice, else loopback.
     ///
     /// # Errors
     /// When no interface has the address.
-    pub(super) fn into(session: &Session) -> io::Result<Self> {
+    pub(super) fn to(session: &Session) -> io::Result<Self> {
         let address = session.interface.unwrap_or_else(|| routed(session));
         let named = |found: &nix::ifaddrs::InterfaceAddress| {
             let found = found.address?.as_sockaddr_in()?.ip();
@@ -64,15 +64,15 @@ mod tests {
 
     #[test]
     fn an_address_that_no_interface_has_leads_nowhere() {
-        let way = |interface| {
-            Way::into(&Session {
+        let route = |interface| {
+            Route::to(&Session {
                 cid: 111,
                 interface: Some(interface),
             })
         };
-        let loopback = way(Ipv4Addr::LOCALHOST).unwrap();
-        assert_eq!(loopback, way(Ipv4Addr::LOCALHOST).unwrap());
-        let problem = way(Ipv4Addr::new(192, 0, 2, 77)).unwrap_err().to_string();
+        let loopback = route(Ipv4Addr::LOCALHOST).unwrap();
+        assert_eq!(loopback, route(Ipv4Addr::LOCALHOST).unwrap());
+        let problem = route(Ipv4Addr::new(192, 0, 2, 77)).unwrap_err().to_string();
         assert_eq!(problem, "no interface has the address 192.0.2.77");
     }
 }
