@@ -1,6 +1,7 @@
 //! Values over time: between two of them, a little beyond the last, and no farther.
 
 use super::lag::{Clock, Lag};
+use super::{Pose, wrapped_rad};
 use crate::time::{Span, Time};
 
 /// Values nearer to the last one than this add nothing: no source of poses sends 500 a second, and a flood costs no more.
@@ -19,6 +20,28 @@ pub(super) trait Blend: Copy {
 impl Blend for f64 {
     fn blend(&self, other: &Self, share: f64) -> Self {
         self + share * (other - self)
+    }
+}
+
+/// An angle that is blended the shorter way round.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Yaw(pub(super) f64);
+
+impl Blend for Yaw {
+    fn blend(&self, other: &Self, share: f64) -> Self {
+        Self(wrapped_rad(self.0 + share * wrapped_rad(other.0 - self.0)))
+    }
+}
+
+impl Blend for Pose {
+    fn blend(&self, other: &Self, share: f64) -> Self {
+        self.toward(other, share)
+    }
+}
+
+impl Blend for [f64; 3] {
+    fn blend(&self, other: &Self, share: f64) -> Self {
+        [0, 1, 2].map(|axis| self[axis] + share * (other[axis] - self[axis]))
     }
 }
 

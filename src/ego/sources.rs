@@ -1,7 +1,7 @@
 //! What the session says of the vehicle's pose: a history for each source of whole poses.
 
 use super::geodesy::{Geodetic, LocalFrame};
-use super::history::{Blend, History};
+use super::history::{History, Yaw};
 use super::lag::Clock;
 use super::reading::{Direction, Reading, Source};
 use super::senders::Senders;
@@ -32,28 +32,6 @@ pub(super) struct Sources {
     current: Option<Source>,
     epoch: u32,
     jumps: u64,
-}
-
-/// An angle that is blended the shorter way round.
-#[derive(Debug, Clone, Copy)]
-struct Yaw(f64);
-
-impl Blend for Yaw {
-    fn blend(&self, other: &Self, share: f64) -> Self {
-        Self(wrapped_rad(self.0 + share * wrapped_rad(other.0 - self.0)))
-    }
-}
-
-impl Blend for Pose {
-    fn blend(&self, other: &Self, share: f64) -> Self {
-        self.toward(other, share)
-    }
-}
-
-impl Blend for [f64; 3] {
-    fn blend(&self, other: &Self, share: f64) -> Self {
-        [0, 1, 2].map(|axis| self[axis] + share * (other[axis] - self[axis]))
-    }
 }
 
 /// The order in which sources are asked.
