@@ -8,7 +8,7 @@ use crate::cloud::{CloudParameters, OwnVehicle, Revolution, Source, Turn};
 const UPRIGHT: (f64, f64) = (1e6, 1e-6);
 
 impl Scan {
-    /// Takes a revolution in. [`super::Intake`] has seen to it that it fits.
+    /// Takes a revolution in. [`crate::cloud::Intake`] has seen to it that it fits.
     pub fn fill(
         &mut self,
         revolution: &Revolution<'_>,
