@@ -44,6 +44,9 @@ pub mod track;
 // What is static, and what is free.
 pub mod grid;
 
+// Maps of roads, and the roundabouts in them.
+pub mod roadmap;
+
 // Objects to messages, messages to frames.
 pub mod publish;
 

@@ -52,6 +52,10 @@ mod record;
 
 mod replay;
 
+mod roads;
+
+mod roundabout;
+
 mod run;
 
 mod score;
@@ -102,6 +106,8 @@ enum Command {
     View(view::Arguments),
     /// Say what is in a recording.
     Inspect(inspect::Arguments),
+    /// Say what roundabouts are in a map of roads.
+    Roundabout(roundabout::Arguments),
     /// Print the complete configuration.
     Config(config::Arguments),
     /// Ask whether the daemon on this host is receiving and keeping up.
@@ -168,6 +174,7 @@ pub fn main() -> ExitCode {
         Command::Convert(arguments) => convert::run(&arguments),
         Command::View(arguments) => view::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Roundabout(arguments) => roundabout::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Health(arguments) => health::run(&arguments),
     };

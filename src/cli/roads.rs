@@ -1,0 +1,86 @@
+//! Maps of roads as files: which format it is, is found from the bytes.
+
+use std::io::{Cursor, Read as _};
+use std::path::Path;
+
+use anyhow::{Context as _, Result, anyhow, bail};
+
+use super::files;
+use crate::ego::geodesy::Geodetic;
+use crate::roadmap::{Origin, Roadmap, osm, scn};
+
+/// What a scenario archive's text may grow to: a map of a city has a tenth.
+const LARGEST_SCENARIO: u64 = 256 << 20;
+/// The scenario in an archive.
+const SCENARIO_NAME: &str = "scenario.scn";
+
+/// Reads a scenario, an archive with one, or an extract of OpenStreetMap. An origin that is given
+/// takes the place of the file's.
+pub(super) fn read(path: &Path, origin: Option<Geodetic>) -> Result<Roadmap> {
+    let bytes = files::read(path)?;
+    parse(&bytes, origin).with_context(|| path.display().to_string())
+}
+
+fn parse(bytes: &[u8], origin: Option<Geodetic>) -> Result<Roadmap> {
+    if bytes.starts_with(b"PK\x03\x04") {
+        return scenario(&unpacked(bytes)?, origin);
+    }
+    let text = String::from_utf8_lossy(bytes);
+    let is_xml = text
+        .trim_start_matches('\u{feff}')
+        .trim_start()
+        .starts_with('<');
+    if is_xml {
+        return Ok(osm::read(&text, origin)?);
+    }
+    scenario(&text, origin)
+}
+
+fn scenario(text: &str, origin: Option<Geodetic>) -> Result<Roadmap> {
+    let mut map = scn::read(text)?;
+    if let Some(place) = origin {
+        let rotation_rad = map.origin.map_or(0.0, |origin| origin.rotation_rad);
+        map.origin = Some(Origin {
+            place,
+            rotation_rad,
+            is_longitude_first: false,
+        });
+    }
+    Ok(map)
+}
+
+fn unpacked(bytes: &[u8]) -> Result<String> {
+    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).context("a damaged archive")?;
+    let names: Vec<String> = archive
+        .file_names()
+        .filter_map(|name| Some(name.ok()?.into_owned()))
+        .filter(|name| name.to_lowercase().ends_with(".scn"))
+        .collect();
+    let usual = names.iter().find(|&name| name == SCENARIO_NAME);
+    let name = usual
+        .or(names.first())
+        .ok_or_else(|| anyhow!("an archive without {SCENARIO_NAME}"))?;
+    let file = archive.by_name(name).with_context(|| name.clone())?;
+    let mut content = vec![];
+    file.take(LARGEST_SCENARIO + 1)
+        .read_to_end(&mut content)
+        .with_context(|| format!("{name} in the archive"))?;
+    if content.len() as u64 > LARGEST_SCENARIO {
+        bail!("{name} in the archive is larger than {LARGEST_SCENARIO} bytes");
+    }
+    Ok(String::from_utf8_lossy(&content).into_owned())
+}
+
+/// An origin on the command line: latitude and longitude.
+pub(super) fn origin(text: &str) -> Result<Geodetic, String> {
+    let degrees = |text: &str| text.trim().parse::<f64>().ok();
+    text.split_once(',')
+        .and_then(|(latitude, longitude)| degrees(latitude).zip(degrees(longitude)))
+        .map(|(latitude_deg, longitude_deg)| Geodetic {
+            latitude_deg,
+            longitude_deg,
+            altitude_m: 0.0,
+        })
+        .filter(Geodetic::is_valid)
+        .ok_or_else(|| "latitude and longitude are wanted, as 57.77284,12.769964".to_owned())
+}

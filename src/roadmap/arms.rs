@@ -1,0 +1,139 @@
+//! Lanes that lead to a circle and away from it, and the arms that they make.
+
+use std::collections::BTreeSet;
+use std::f64::consts::{PI, TAU};
+
+use super::network::Network;
+use super::rings::OFF_CIRCLE_M;
+use super::roundabout::{Access, Arm, Roundabout};
+use super::{Lane, LaneId, Polyline};
+
+/// How far from the circle arms are followed.
+pub(super) const REACH_M: f64 = 60.0;
+/// An entry without a connector points at the circle and ends within this of its edge; so does an
+/// exit begin. Drawn lanes stop where the corner begins.
+const MOUTH_M: f64 = 12.0;
+/// Exit and entry of one arm are no farther apart than this.
+const ARM_RAD: f64 = 75.0 * PI / 180.0;
+
+/// Lanes that lead into the circle, and out of it.
+pub(super) fn accesses(
+    network: &Network<'_>,
+    roundabout: &Roundabout,
+) -> (Vec<Access>, Vec<Access>) {
+    let (centre_m, outer_m) = (roundabout.centre_m(), roundabout.outer_m());
+    let on_ring = |way: &Polyline| {
+        let points_m = way.points_m();
+        roundabout.rings.iter().any(|ring| {
+            let on = |&&at_m: &&[f64; 2]| ring.circle.off_m(at_m).abs() < 2.0 * OFF_CIRCLE_M;
+            2 * points_m.iter().filter(on).count() > points_m.len()
+        })
+    };
+    let lanes = || network.lanes.iter().zip(&network.ways);
+    let rings = lanes()
+        .filter(|(_, way)| on_ring(way))
+        .map(|(lane, _)| lane.id);
+    let rings: BTreeSet<LaneId> = rings.collect();
+    let into_ring: BTreeSet<LaneId> = network
+        .leads
+        .iter()
+        .filter(|(_, targets)| !targets.is_disjoint(&rings))
+        .map(|(&from, _)| from)
+        .collect();
+    let from_ring = rings
+        .iter()
+        .filter_map(|ring| network.leads.get(ring))
+        .flatten();
+    let from_ring: BTreeSet<LaneId> = from_ring.copied().collect();
+    // Prolonged beyond its end, or before its beginning.
+    let meets = |way: &Polyline, is_entry: bool| {
+        let (end_m, heading_rad) = way.at(if is_entry { way.length_m() } else { 0.0 });
+        let [x, y] = [centre_m[0] - end_m[0], centre_m[1] - end_m[1]];
+        let side = if is_entry { 1.0 } else { -1.0 };
+        let (sine, cosine) = libm::sincos(heading_rad);
+        let (ahead_m, beside_m) = (side * (x * cosine + y * sine), y * cosine - x * sine);
+        let away_m = libm::hypot(x, y) - outer_m;
+        away_m < 0.0 || (away_m < MOUTH_M && ahead_m > 0.0 && beside_m.abs() < outer_m)
+    };
+    let (mut entries, mut exits) = (vec![], vec![]);
+    for (lane, way) in lanes().filter(|(lane, _)| !rings.contains(&lane.id)) {
+        if into_ring.contains(&lane.id) || meets(way, true) {
+            entries.push(access(lane, roundabout, true));
+        }
+        if from_ring.contains(&lane.id) || meets(way, false) {
+            exits.push(access(lane, roundabout, false));
+        }
+    }
+    (entries, exits)
+}
+
+pub(super) fn access(lane: &Lane, roundabout: &Roundabout, is_entry: bool) -> Access {
+    let whole = lane.curve.polyline();
+    let length_m = whole.length_m();
+    let way = if is_entry {
+        whole.between((length_m - REACH_M).max(0.0), length_m)
+    } else {
+        whole.between(0.0, REACH_M.min(length_m))
+    };
+    let (end_m, _) = way.at(if is_entry { way.length_m() } else { 0.0 });
+    let [x, y] = roundabout.centre_m();
+    Access {
+        lane: lane.id,
+        width_m: lane.width_m(),
+        kind: lane.kind,
+        mouth_rad: libm::atan2(end_m[1] - y, end_m[0] - x),
+        way,
+    }
+}
+
+/// Exits and entries that belong together: going round, one comes to an arm's exit before its
+/// entry.
+pub(super) fn arms(entries: Vec<Access>, exits: Vec<Access>, is_clockwise: bool) -> Vec<Arm> {
+    let side = if is_clockwise { -1.0 } else { 1.0 };
+    let round_rad = |angle_rad: f64| {
+        let share = side * angle_rad / TAU;
+        (share - libm::floor(share)) * TAU
+    };
+    let mut mouths: Vec<_> = entries.into_iter().map(|access| (true, access)).collect();
+    mouths.extend(exits.into_iter().map(|access| (false, access)));
+    mouths.sort_by(|(_, a), (_, b)| round_rad(a.mouth_rad).total_cmp(&round_rad(b.mouth_rad)));
+    // Begin behind the widest gap.
+    let count = mouths.len();
+    let gap_before = |index: usize| {
+        let before = &mouths[(index + count - 1) % count].1;
+        let step_rad = round_rad(mouths[index].1.mouth_rad - before.mouth_rad);
+        if count == 1 { TAU } else { step_rad }
+    };
+    let widest = (0..count).max_by(|&a, &b| gap_before(a).total_cmp(&gap_before(b)));
+    mouths.rotate_left(widest.unwrap_or(0));
+    let mut found: Vec<Arm> = vec![];
+    let mut last_rad = 0.0;
+    for (is_entry, access) in mouths {
+        let step_rad = round_rad(access.mouth_rad - last_rad);
+        last_rad = access.mouth_rad;
+        let joins = found.last().is_some_and(|arm| {
+            step_rad < ARM_RAD && (is_entry || (arm.entries.is_empty() && step_rad < ARM_RAD / 2.0))
+        });
+        if !joins {
+            found.push(Arm::default());
+        }
+        if let Some(arm) = found.last_mut() {
+            let home = if is_entry {
+                &mut arm.entries
+            } else {
+                &mut arm.exits
+            };
+            home.push(access);
+        }
+    }
+    for arm in &mut found {
+        let mouths = arm.entries.iter().chain(&arm.exits);
+        let [x, y] = mouths.fold([0.0; 2], |[x, y], access| {
+            let (sine, cosine) = libm::sincos(access.mouth_rad);
+            [x + cosine, y + sine]
+        });
+        arm.bearing_rad = libm::atan2(y, x);
+    }
+    found.sort_by(|a, b| a.bearing_rad.total_cmp(&b.bearing_rad));
+    found
+}
