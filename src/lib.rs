@@ -47,6 +47,9 @@ pub mod grid;
 // Maps of roads, and the roundabouts in them.
 pub mod roadmap;
 
+// Road users on the lanes of a roundabout, and the gap between them.
+pub mod roundabout;
+
 // Objects to messages, messages to frames.
 pub mod publish;
 

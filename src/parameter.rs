@@ -87,6 +87,8 @@ pub enum Domain {
     Choice(&'static [&'static str]),
     /// Addresses of hosts.
     Addresses,
+    /// Any text.
+    Text,
 }
 
 impl fmt::Display for Domain {
@@ -97,6 +99,7 @@ impl fmt::Display for Domain {
             Self::Whole(low, high) | Self::Real(low, high) => write!(f, "{low} to {high}"),
             Self::Choice(names) => write!(f, "{}", names.join(", ")),
             Self::Addresses => write!(f, "IPv4 addresses with commas between them"),
+            Self::Text => write!(f, "a text"),
         }
     }
 }
@@ -140,7 +143,7 @@ fn wanted(domain: &Domain, unit: &str) -> String {
         Domain::Whole(..) => format!("a whole number, {domain}{}", spaced(unit)),
         Domain::Real(..) => format!("a number, {domain}{}", spaced(unit)),
         Domain::Choice(_) => format!("one of {domain}"),
-        Domain::Addresses => domain.to_string(),
+        Domain::Addresses | Domain::Text => domain.to_string(),
     }
 }
 
@@ -267,6 +270,27 @@ impl Setting for Addresses {
             .filter(|part| !part.is_empty());
         let addresses: Option<_> = parts.map(|part| part.parse().ok()).collect();
         addresses.map(Self)
+    }
+}
+
+/// A text, as the name of a file.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Text(pub String);
+
+impl Setting for Text {
+    fn domain(_bounds: Option<(f64, f64)>) -> Domain {
+        Domain::Text
+    }
+
+    fn to_value(&self) -> Value {
+        Value::Text(self.0.clone())
+    }
+
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Text(text) => Some(Self(text.clone())),
+            _ => None,
+        }
     }
 }
 

@@ -6,8 +6,10 @@ use crate::cluster::Dbscan;
 use crate::config::Configuration;
 use crate::ego::{Ego, Heard, Placement, Sweep};
 use crate::grid::{Grid, Perceived};
-use crate::ground::{Ground, Origin};
+use crate::ground::{Ground, Origin, Plane};
 use crate::publish::{Heading, Publisher};
+use crate::roadmap::Roadmap;
+use crate::roundabout::{Advice, Sight, Situation, Watcher};
 use crate::time::Time;
 use crate::track::{Object, Scene, Tracker};
 use crate::wire::point_cloud::{CompactPointCloud, POINT_CLOUD_ID};
@@ -57,6 +59,7 @@ pub struct Pipeline {
     /// The last revolution's objects in the local frame.
     objects: Vec<Object>,
     grid: Grid,
+    roundabouts: Watcher,
     publisher: Publisher,
     last: Option<RevolutionReport>,
     counts: Counts,
@@ -79,11 +82,17 @@ impl Pipeline {
             tracker: Tracker::new(&configuration.track),
             objects: vec![],
             grid: Grid::new(&configuration.grid),
+            roundabouts: Watcher::new(&configuration.roundabout),
             publisher: Publisher::new(&configuration.publish, sender_stamp),
             last: None,
             counts: Counts::default(),
             configuration: configuration.clone(),
         }
+    }
+
+    /// Takes the map of roads that the configuration names; gives how many roundabouts are in it.
+    pub fn take_map(&mut self, map: &Roadmap) -> usize {
+        self.roundabouts.take_map(map)
     }
 
     /// Whether messages of this number are of any interest.
@@ -263,6 +272,7 @@ impl Pipeline {
             self.beams.reset();
             self.tracker.reset();
             self.grid.reset();
+            self.roundabouts.forget();
         }
         let time = self.scan.time();
         let missed = self.missed_before(time);
@@ -303,7 +313,6 @@ impl Pipeline {
         self.beams
             .remember(&self.scan, ground_mask, moving, &sweep, &self.placements);
         done(Step::Track);
-
         let report = RevolutionReport {
             number: self.last.map_or(0, |last| last.number.wrapping_add(1)),
             time,
@@ -329,7 +338,28 @@ impl Pipeline {
         self.counts.ground_held += u64::from(ground.origin == Origin::Held);
         self.counts.ground_fallback += u64::from(ground.origin == Origin::Fallback);
         self.last = Some(report);
+        self.watch_roundabouts(time, &ground.plane);
         report
+    }
+
+    fn watch_roundabouts(&mut self, time: Time, ground: &Plane) {
+        let sweep = &self.sweep;
+        let [x, y] = sweep.velocity_mps(self.scan.duration_s());
+        let sensor = sweep.local_attitude();
+        let situation = Situation {
+            time,
+            frame: sweep.frame,
+            reference: sweep.reference,
+            vehicle: sweep.vehicle,
+            vehicle_speed_mps: libm::hypot(x, y),
+            objects: &self.objects,
+            sight: Some(Sight {
+                scan: &self.scan,
+                sensor: &sensor,
+                ground,
+            }),
+        };
+        self.roundabouts.watch(&situation);
     }
 
     /// How many revolutions should have been between the last one and one at a time.
@@ -362,6 +392,9 @@ impl Pipeline {
                 sweep: &self.sweep,
             };
             self.publisher.publish_objects(&heading, &self.objects);
+            if let Some(advice) = self.roundabouts.advice() {
+                self.publisher.add_roundabout(&heading, advice);
+            }
         }
         self.publisher.frames()
     }
@@ -413,6 +446,11 @@ impl Pipeline {
     /// The last revolution's objects in the local frame, by id.
     pub fn objects(&self) -> &[Object] {
         &self.objects
+    }
+
+    /// What was said of the nearest roundabout in the last revolution.
+    pub fn advice(&self) -> Option<&Advice> {
+        self.roundabouts.advice()
     }
 
     /// Where the sensor was in the last revolution.

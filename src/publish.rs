@@ -3,13 +3,14 @@
 use crate::ego::{Pose, Sweep};
 use crate::grid::Grid;
 use crate::parameter::{choices, parameters};
+use crate::roundabout::{Advice, ArmAdvice, Hindrance, Place, UserOnLane, Window};
 use crate::time::{Span, Time};
 use crate::track::Object;
 use crate::wire::envelope::Postmark;
 use crate::wire::environment::{Direction, Environment, PerceivedObject};
 use crate::wire::message::List;
 use crate::wire::object_list::ObjectList;
-use crate::wire::{Message, TimeStamp, object_list, opendlv};
+use crate::wire::{Message, TimeStamp, object_list, opendlv, roundabout};
 
 choices! {
     /// Unit of angles in OpenDLV's object messages.
@@ -126,6 +127,16 @@ impl Publisher {
             );
         }
         self.kept = kept;
+    }
+
+    /// Adds what is said of a roundabout to the frames of the same revolution.
+    pub fn add_roundabout(&mut self, heading: &Heading<'_>, advice: &Advice) {
+        let postmark = Postmark {
+            sent: heading.sent,
+            sampled: heading.time,
+            sender_stamp: self.sender_stamp,
+        };
+        self.put(&postmark, &roundabout_of(heading.revolution, advice));
     }
 
     /// Makes the frames of what is to be sent of the map after the revolution of a time.
@@ -251,6 +262,66 @@ fn fill_list(list: &mut ObjectList, heading: &Heading<'_>, objects: &[Object], o
         reference_latitude: reference.map_or(0.0, |place| place.latitude_deg),
         reference_longitude: reference.map_or(0.0, |place| place.longitude_deg),
     };
+}
+
+fn roundabout_of(revolution: u32, advice: &Advice) -> roundabout::Roundabout {
+    let arm = |arm: &ArmAdvice| {
+        let (hindrance, hindering_object) = match arm.hindrance {
+            None => (0, 0),
+            Some(Hindrance::RoadUser(id)) => (1, id),
+            Some(Hindrance::Unseen) => (2, 0),
+            Some(Hindrance::NoEntry) => (3, 0),
+        };
+        roundabout::RoundaboutArm {
+            bearing: arm.bearing_rad as f32,
+            may_enter: arm.may_enter,
+            hindrance,
+            hindering_object,
+            gap: arm.gap_s as f32,
+            own_begin: arm.own_window_s[0] as f32,
+            own_end: arm.own_window_s[1] as f32,
+            margin: arm.margin_s as f32,
+            seen_share: arm.seen_share as f32,
+        }
+    };
+    let window = |window: &Window| roundabout::ConflictWindow {
+        object_id: window.object_id,
+        arm: window.arm as u32,
+        kind: window.kind.number(),
+        begin: window.begin_s as f32,
+        end: window.end_s as f32,
+        expected: window.expected_s as f32,
+        probability: window.probability as f32,
+        way: window.way_m as f32,
+    };
+    let user = |user: &UserOnLane| {
+        let (lane_kind, number) = match user.on.place {
+            Place::Ring(number) => (0, number),
+            Place::Entry(arm, _) => (1, arm),
+            Place::Exit(arm, _) => (2, arm),
+            Place::Elsewhere => return None,
+        };
+        Some(roundabout::LaneUser {
+            object_id: user.object_id,
+            lane_kind,
+            number: number as u32,
+            probability: user.on.probability as f32,
+            along: user.on.along_m as f32,
+            offset: user.on.offset_m as f32,
+        })
+    };
+    roundabout::Roundabout {
+        revolution,
+        name: advice.name.clone(),
+        x: advice.centre_m[0],
+        y: advice.centre_m[1],
+        diameter: advice.diameter_m as f32,
+        state: advice.state.number(),
+        own_arm: advice.own_arm.map_or(-1, |arm| arm as i32),
+        arms: List(advice.arms.iter().map(arm).collect()),
+        windows: List(advice.windows.iter().map(window).collect()),
+        users: List(advice.users.iter().filter_map(user).collect()),
+    }
 }
 
 fn environment_of(valid_until: Time, objects: &[Object], sensor: &Pose) -> Environment {

@@ -5,6 +5,7 @@
 use kreisel::wire::grid_tile::{GridTile, encode_cells};
 use kreisel::wire::message::List;
 use kreisel::wire::object_list::{Object, ObjectList};
+use kreisel::wire::roundabout::{ConflictWindow, LaneUser, Roundabout, RoundaboutArm};
 use kreisel::wire::status::Status;
 use kreisel::wire::{FieldDescription, Message};
 use prost_reflect::{DescriptorPool, DynamicMessage, Value};
@@ -50,6 +51,10 @@ fn the_odvd_lists_every_field_of_every_message_that_is_published() {
         table::<ObjectList>(),
         table::<GridTile>(),
         table::<Status>(),
+        table::<RoundaboutArm>(),
+        table::<ConflictWindow>(),
+        table::<LaneUser>(),
+        table::<Roundabout>(),
     ];
     assert_eq!(odvd_messages(), expected);
 }

@@ -64,6 +64,7 @@ async fn demonstrate(arguments: &Arguments) -> Result<()> {
         session: Some(session),
         sensor: None,
         publish_cloud: false,
+        roads: arguments.scenario.roads(),
         sender_stamp: SENDER_STAMP,
         configuration,
         view,

@@ -26,6 +26,8 @@ mod demo;
 
 mod files;
 
+mod gap_score;
+
 mod health;
 
 mod inspect;

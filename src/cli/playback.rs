@@ -9,6 +9,7 @@ use tokio::time::{Instant, sleep_until};
 use super::replay::LONGEST_PAUSE_S;
 use crate::config::Configuration;
 use crate::pipeline::{Outcome, Pipeline, RevolutionReport, Step};
+use crate::roadmap::Roadmap;
 use crate::view::{Control, Feed, Player};
 use crate::wire::Message as _;
 use crate::wire::point_cloud::POINT_CLOUD_ID;
@@ -69,6 +70,7 @@ impl Timeline {
 /// A recording that is played, and how far.
 pub(super) struct Playback<'a> {
     configuration: Configuration,
+    roads: Option<Roadmap>,
     pipeline: Pipeline,
     entries: Vec<Entry<'a>>,
     timeline: Timeline,
@@ -83,6 +85,14 @@ pub(super) struct Playback<'a> {
     player: Player,
 }
 
+fn fresh(configuration: &Configuration, roads: Option<&Roadmap>) -> Pipeline {
+    let mut pipeline = Pipeline::new(configuration, 0);
+    if let Some(roads) = roads {
+        pipeline.take_map(roads);
+    }
+    pipeline
+}
+
 /// Speeds that a viewer may choose.
 const SPEEDS: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 
@@ -93,13 +103,15 @@ impl<'a> Playback<'a> {
     /// A recording at its begin.
     pub(super) fn new(
         configuration: Configuration,
+        roads: Option<Roadmap>,
         entries: Vec<Entry<'a>>,
         timeline: Timeline,
         feed: Feed,
     ) -> Self {
         Self {
-            pipeline: Pipeline::new(&configuration, 0),
+            pipeline: fresh(&configuration, roads.as_ref()),
             configuration,
+            roads,
             entries,
             player: Player {
                 at_s: 0.0,
@@ -201,7 +213,7 @@ impl<'a> Playback<'a> {
     }
 
     fn begin_anew(&mut self) {
-        self.pipeline = Pipeline::new(&self.configuration, 0);
+        self.pipeline = fresh(&self.configuration, self.roads.as_ref());
         self.feed.forget();
         (self.next, self.shown) = (0, None);
         self.player.at_s = 0.0;

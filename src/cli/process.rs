@@ -10,7 +10,7 @@ use super::labels::LabelWriter;
 use super::npz::Archive;
 use super::score::Score;
 use super::summary::Summary;
-use super::{Completion, files, map, objects};
+use super::{Completion, files, map, objects, roads};
 use crate::pipeline::{Fault, Outcome, Pipeline, RevolutionReport};
 use crate::tally::Tally;
 use crate::time::Time;
@@ -47,6 +47,9 @@ pub(super) struct Arguments {
     /// Configuration file; `kreisel config` prints one.
     #[arg(long, value_name = "FILE.toml")]
     config: Option<PathBuf>,
+    /// Map of roads with roundabouts to watch (.scn, .scnx, .osm), instead of the configuration's.
+    #[arg(long, value_name = "MAP")]
+    map: Option<PathBuf>,
     /// senderStamp of what is sent.
     #[arg(long, value_name = "STAMP", default_value_t = 0)]
     id: u32,
@@ -85,9 +88,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
         Some(&arguments.input),
         arguments.truth.as_ref(),
         arguments.config.as_ref(),
+        arguments.map.as_ref(),
     ];
     files::check_distinct(&inputs, &outputs.map(Option::as_ref))?;
     let asks_nothing = arguments.truth.is_none() && outputs.iter().all(|output| output.is_none());
+    let roads = roads::configured(&mut configuration, arguments.map.as_deref())?;
     let mut process = Process {
         arguments,
         score: arguments.truth.as_deref().map(Score::read).transpose()?,
@@ -106,6 +111,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
         status_due: None,
         faults: Tally::default(),
     };
+    if let Some(roads) = &roads {
+        process.pipeline.take_map(roads);
+        if let Some(score) = &mut process.score {
+            score.watch_gaps(&configuration.roundabout, roads);
+        }
+    }
     let bar = files::progress(bytes.len(), "bytes");
     let mut damages = usize::from(completion == Completion::Damaged);
     for item in Recording::new(&bytes) {
@@ -169,7 +180,7 @@ impl Process<'_> {
             output.put(trajectory_line(report.time, &self.pipeline).as_bytes())?;
         }
         if let Some(score) = &mut self.score {
-            score.take(report, self.pipeline.objects());
+            score.take(report, &self.pipeline);
         }
         if let Some(summary) = &mut self.summary {
             summary.take(report, self.pipeline.objects());
@@ -225,6 +236,9 @@ impl Process<'_> {
         );
         if let Some(score) = &self.score {
             say!("{}", score.summary());
+            if let Some(gaps) = score.gap_summary() {
+                say!("{gaps}");
+            }
         }
         if let Some(summary) = &self.summary {
             summary.print(&self.arguments.input)?;

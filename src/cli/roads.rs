@@ -6,8 +6,10 @@ use std::path::Path;
 use anyhow::{Context as _, Result, anyhow, bail};
 
 use super::files;
+use crate::config::Configuration;
 use crate::ego::geodesy::Geodetic;
-use crate::roadmap::{Origin, Roadmap, osm, scn};
+use crate::parameter::Text;
+use crate::roadmap::{Origin, Roadmap, osm, roundabouts, scn};
 
 /// What a scenario archive's text may grow to: a map of a city has a tenth.
 const LARGEST_SCENARIO: u64 = 256 << 20;
@@ -69,6 +71,25 @@ fn unpacked(bytes: &[u8]) -> Result<String> {
         bail!("{name} in the archive is larger than {LARGEST_SCENARIO} bytes");
     }
     Ok(String::from_utf8_lossy(&content).into_owned())
+}
+
+/// The roads that a configuration names, if it does; a map on the command line takes its place.
+pub(super) fn configured(
+    configuration: &mut Configuration,
+    map: Option<&Path>,
+) -> Result<Option<Roadmap>> {
+    if let Some(path) = map {
+        configuration.roundabout.map = Text(path.display().to_string());
+    }
+    let Text(name) = &configuration.roundabout.map;
+    if name.is_empty() {
+        return Ok(None);
+    }
+    let found = read(Path::new(name), None)?;
+    if roundabouts(&found).is_empty() {
+        bail!("{name}: no roundabout is in it; `kreisel roundabout` says what is");
+    }
+    Ok(Some(found))
 }
 
 /// An origin on the command line: latitude and longitude.

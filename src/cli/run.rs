@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, Result};
 use clap::Args;
 
-use super::{Completion, block_on, files, stop_signal};
+use super::{Completion, block_on, files, roads, stop_signal};
 use crate::daemon::sensor::SensorPort;
 use crate::daemon::session::Session;
 use crate::daemon::{self, Options};
@@ -38,6 +38,9 @@ pub(super) struct Arguments {
     /// Configuration file; `kreisel config` prints one.
     #[arg(long, value_name = "FILE.toml")]
     config: Option<PathBuf>,
+    /// Map of roads with roundabouts to watch (.scn, .scnx, .osm), instead of the configuration's.
+    #[arg(long, value_name = "MAP")]
+    map: Option<PathBuf>,
     /// Show what is seen in a browser, at this address [default: 127.0.0.1:8111].
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = DEFAULT_ADDRESS)]
     view: Option<SocketAddr>,
@@ -51,7 +54,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     // Without a session there is one interface to speak of.
     let alone = interface.filter(|_| arguments.cid.is_none());
     let sensor_interface = arguments.sensor_interface.or(alone);
+    let mut configuration = files::configuration(arguments.config.as_deref())?;
     let options = Options {
+        roads: roads::configured(&mut configuration, arguments.map.as_deref())?,
         session: arguments.cid.map(|cid| Session { cid, interface }),
         sensor: arguments.velodyne.map(|port| SensorPort {
             port,
@@ -60,7 +65,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
         }),
         publish_cloud: arguments.publish_cloud,
         sender_stamp: arguments.id,
-        configuration: files::configuration(arguments.config.as_deref())?,
+        configuration,
         view: arguments.view.map(serve_view).transpose()?,
     };
     block_on(async { Ok(daemon::run(options, stop_signal()).await?) })?;

@@ -9,9 +9,13 @@ use anyhow::{Context as _, Result, anyhow};
 use serde::Deserialize;
 
 use super::files;
+use super::gap_score::{GapScore, TrueState};
 use crate::ego::{Frame, Pose};
-use crate::pipeline::RevolutionReport;
-use crate::track::Object;
+use crate::pipeline::{Pipeline, RevolutionReport};
+use crate::roadmap::Roadmap;
+use crate::roundabout::{RoundaboutParameters, Situation};
+use crate::time::Time;
+use crate::track::{Class, Object};
 
 #[derive(Debug, Deserialize)]
 struct TrueLine {
@@ -25,14 +29,28 @@ struct TrueEgo {
     x: f64,
     y: f64,
     yaw: f64,
+    #[serde(default)]
+    v: f64,
 }
 
 #[derive(Debug, Deserialize)]
 struct TrueUser {
     id: u32,
+    #[serde(default)]
+    class: String,
     x: f64,
     y: f64,
+    #[serde(default)]
+    yaw: f64,
     v: f64,
+    #[serde(default)]
+    yaw_rate: f64,
+    #[serde(default)]
+    l: f64,
+    #[serde(default)]
+    w: f64,
+    #[serde(default)]
+    h: f64,
     points: usize,
 }
 
@@ -55,6 +73,7 @@ pub(super) struct Score {
     off_mps: f64,
     false_objects: usize,
     switches: usize,
+    gaps: Option<GapScore>,
 }
 
 impl Score {
@@ -83,12 +102,19 @@ impl Score {
             off_mps: 0.0,
             false_objects: 0,
             switches: 0,
+            gaps: None,
         })
+    }
+
+    /// Compares what is said of a map's roundabouts, too.
+    pub(super) fn watch_gaps(&mut self, parameters: &RoundaboutParameters, roads: &Roadmap) {
+        self.gaps = Some(GapScore::new(parameters, roads));
     }
 
     /// Compares a revolution's objects, the closest pairs first. Revolutions without truth do
     /// not count.
-    pub(super) fn take(&mut self, report: &RevolutionReport, objects: &[Object]) {
+    pub(super) fn take(&mut self, report: &RevolutionReport, pipeline: &Pipeline) {
+        let objects = pipeline.objects();
         /// Truth and revolution mean the same time if they differ by less, in microseconds.
         const SAME_TIME: i64 = 5_000;
         let time = report.time.micros();
@@ -131,6 +157,32 @@ impl Score {
             }
         }
         self.false_objects += is_taken.iter().filter(|taken| !**taken).count();
+        if let (Some(gaps), Some(advice)) = (&mut self.gaps, pipeline.advice()) {
+            let users: Vec<Object> = line
+                .objects
+                .iter()
+                .map(|user| user.object(report.time))
+                .collect();
+            let vehicle = Pose {
+                position_m: [line.ego.x, line.ego.y, 0.0],
+                yaw_rad: line.ego.yaw,
+            };
+            let situation = Situation {
+                time: report.time,
+                frame: report.frame,
+                reference: pipeline.sweep().reference,
+                vehicle: Some(vehicle),
+                vehicle_speed_mps: line.ego.v,
+                objects: &users,
+                sight: None,
+            };
+            gaps.take(advice, objects, &situation);
+        }
+    }
+
+    /// The same of gaps, if there are any.
+    pub(super) fn gap_summary(&self) -> Option<String> {
+        self.gaps.as_ref().map(GapScore::summary)
     }
 
     /// One line for people.
@@ -148,6 +200,28 @@ impl Score {
             share(self.false_objects as f64, self.revolutions),
             self.switches,
         )
+    }
+}
+
+impl TrueUser {
+    fn object(&self, time: Time) -> Object {
+        let class = match self.class.as_str() {
+            "car" => Class::Car,
+            "truck" => Class::LargeVehicle,
+            "cyclist" => Class::Cyclist,
+            "pedestrian" => Class::Pedestrian,
+            _ => Class::Unclassified,
+        };
+        let state = TrueState {
+            id: self.id,
+            class,
+            place_m: [self.x, self.y],
+            yaw_rad: self.yaw,
+            speed_mps: self.v,
+            yaw_rate_radps: self.yaw_rate,
+            size_m: [self.l, self.w, self.h],
+        };
+        state.object(time)
     }
 }
 

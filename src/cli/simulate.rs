@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::Args;
 use tokio::time::{Instant, sleep_until};
 
@@ -13,6 +13,7 @@ use super::npz::Archive;
 use super::pcap::PcapWriter;
 use super::{Completion, map, objects};
 use crate::daemon::session::Sender;
+use crate::roadmap::scn;
 use crate::simulate::scenario::{self, Scenario};
 use crate::simulate::{Simulation, Truth};
 use crate::wire::Recording;
@@ -40,6 +41,9 @@ pub(super) struct Arguments {
     /// True labels of all points: 0 no return, 1 ground, 2 structure, 100 + n road user n.
     #[arg(long, value_name = "FILE.npz")]
     labels: Option<PathBuf>,
+    /// The map of the roads, if there is a roundabout.
+    #[arg(long, value_name = "OUT.scn")]
+    map: Option<PathBuf>,
     /// True map at the end: bit 0 occupied, bit 1 seen, bit 2 passed by a ray.
     #[arg(long, value_name = "FILE.npz")]
     grid: Option<PathBuf>,
@@ -109,8 +113,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
         arguments.truth.as_ref(),
         arguments.labels.as_ref(),
         arguments.grid.as_ref(),
+        arguments.map.as_ref(),
     ];
     check_distinct(&[], &outputs)?;
+    if let Some(path) = &arguments.map {
+        let Some(roads) = scenario.roads() else {
+            bail!("there is no map of the roads of {}", scenario.name);
+        };
+        let mut output = Output::create(path)?;
+        output.put(scn::write(&roads).as_bytes())?;
+        output.finish()?;
+    }
     let in_packets = path
         .extension()
         .is_some_and(|extension| extension == "pcap");

@@ -9,7 +9,7 @@ use tokio::sync::mpsc;
 
 use super::onlooker::watch;
 use super::playback::{Playback, Timeline};
-use super::{Completion, block_on, files, stop_signal};
+use super::{Completion, block_on, files, roads, stop_signal};
 use crate::daemon::session::Session;
 use crate::view::{self, Control, DEFAULT_ADDRESS, Feed};
 use crate::wire::Recording;
@@ -28,6 +28,9 @@ pub(super) struct Arguments {
     /// Where the page is served.
     #[arg(long, value_name = "ADDRESS", default_value = DEFAULT_ADDRESS)]
     address: SocketAddr,
+    /// Map of roads with roundabouts to watch (.scn, .scnx, .osm), instead of the configuration's.
+    #[arg(long, value_name = "MAP", conflicts_with = "cid")]
+    map: Option<PathBuf>,
     /// Configuration file; `kreisel config` prints one.
     #[arg(long, value_name = "FILE.toml", conflicts_with = "cid")]
     config: Option<PathBuf>,
@@ -65,7 +68,8 @@ fn serve(address: SocketAddr) -> Result<(Feed, mpsc::Receiver<Control>)> {
 }
 
 fn play(arguments: &Arguments, path: &Path) -> Result<Completion> {
-    let configuration = files::configuration(arguments.config.as_deref())?;
+    let mut configuration = files::configuration(arguments.config.as_deref())?;
+    let roads = roads::configured(&mut configuration, arguments.map.as_deref())?;
     let (bytes, mut completion) = files::Recorded::read(path)?.with_packets();
     let mut entries = vec![];
     for item in Recording::new(&bytes) {
@@ -81,7 +85,7 @@ fn play(arguments: &Arguments, path: &Path) -> Result<Completion> {
         bail!("{}: byte 0: no point cloud to show", path.display());
     };
     let (feed, controls) = serve(arguments.address)?;
-    let mut playback = Playback::new(configuration, entries, timeline, feed);
+    let mut playback = Playback::new(configuration, roads, entries, timeline, feed);
     block_on(async {
         tokio::select! {
             () = playback.run(controls) => Ok(()),

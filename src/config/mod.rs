@@ -10,6 +10,7 @@ use crate::grid::GridParameters;
 use crate::ground::GroundParameters;
 use crate::parameter::{Addresses, Profile, Section, Value, parameters};
 use crate::publish::PublishParameters;
+use crate::roundabout::RoundaboutParameters;
 use crate::track::TrackParameters;
 
 parameters! {
@@ -50,6 +51,8 @@ pub struct Configuration {
     pub track: TrackParameters,
     /// The map of the static world.
     pub grid: GridParameters,
+    /// Roundabouts and the gap.
+    pub roundabout: RoundaboutParameters,
     /// What is sent.
     pub publish: PublishParameters,
     /// The network.
@@ -106,13 +109,14 @@ impl Configuration {
             cluster: ClusterParameters::profile(profile),
             track: TrackParameters::profile(profile),
             grid: GridParameters::profile(profile),
+            roundabout: RoundaboutParameters::profile(profile),
             publish: PublishParameters::profile(profile),
             session: SessionParameters::profile(profile),
         }
     }
 
     /// The sections in the order in which a revolution meets them.
-    pub fn sections(&self) -> [&dyn Section; 8] {
+    pub fn sections(&self) -> [&dyn Section; 9] {
         let Self {
             profile: _,
             cloud,
@@ -121,14 +125,17 @@ impl Configuration {
             cluster,
             track,
             grid,
+            roundabout,
             publish,
             session,
         } = self;
-        [cloud, ego, ground, cluster, track, grid, publish, session]
+        [
+            cloud, ego, ground, cluster, track, grid, roundabout, publish, session,
+        ]
     }
 
     /// The same, to be set.
-    pub fn sections_mut(&mut self) -> [&mut dyn Section; 8] {
+    pub fn sections_mut(&mut self) -> [&mut dyn Section; 9] {
         let Self {
             profile: _,
             cloud,
@@ -137,10 +144,13 @@ impl Configuration {
             cluster,
             track,
             grid,
+            roundabout,
             publish,
             session,
         } = self;
-        [cloud, ego, ground, cluster, track, grid, publish, session]
+        [
+            cloud, ego, ground, cluster, track, grid, roundabout, publish, session,
+        ]
     }
 }
 

@@ -43,6 +43,7 @@ use tracing::{info, warn};
 
 use crate::config::{Configuration, SessionParameters};
 use crate::pipeline::Pipeline;
+use crate::roadmap::Roadmap;
 use crate::time::Time;
 use crate::view::Feed;
 use health::Vitals;
@@ -66,6 +67,8 @@ pub struct Options {
     pub publish_cloud: bool,
     /// senderStamp of what is sent.
     pub sender_stamp: u32,
+    /// Roads with roundabouts to watch.
+    pub roads: Option<Roadmap>,
     /// Everything else.
     pub configuration: Configuration,
     /// Where pictures go, if anybody may look.
@@ -130,8 +133,16 @@ pub async fn run(options: Options, stop: impl Future<Output = ()>) -> Result<(),
         view: options.view,
         not_sent: 0,
     };
+    let mut pipeline = Pipeline::new(&options.configuration, options.sender_stamp);
+    if let Some(roads) = &options.roads {
+        let count = pipeline.take_map(roads);
+        info!(
+            "watching the nearest of {count} roundabouts of the map {:?}",
+            roads.name
+        );
+    }
     let worker = Worker::new(
-        Pipeline::new(&options.configuration, options.sender_stamp),
+        pipeline,
         output,
         options.publish_cloud,
         buffer_bytes.unwrap_or_default(),

@@ -22,7 +22,7 @@ use std::collections::BTreeMap;
 use crate::ego::geodesy::Geodetic;
 
 pub use circle::Circle;
-pub use curve::Curve;
+pub use curve::{Curve, Vertex};
 pub use draw::svg;
 pub use elements::{Contradiction, Elements, Kind};
 pub use find::roundabouts;
@@ -127,6 +127,15 @@ impl LaneKind {
             Self::Road => "road",
             Self::Bikeway => "bikeway",
             Self::Pavement => "pavement",
+        }
+    }
+
+    /// The number in `kreisel.ConflictWindow`.
+    pub const fn number(self) -> u32 {
+        match self {
+            Self::Road => 0,
+            Self::Bikeway => 1,
+            Self::Pavement => 2,
         }
     }
 

@@ -9,7 +9,7 @@ use crate::wire::envelope::Postmark;
 use crate::wire::pose::{ApplanixGroup1, GeodeticHeadingReading, GeodeticWgs84Reading};
 
 /// Where simulated worlds lie: the origin of their frame.
-const REFERENCE: Geodetic = Geodetic {
+pub(super) const REFERENCE: Geodetic = Geodetic {
     latitude_deg: 57.71,
     longitude_deg: 11.94,
     altitude_m: 60.0,

@@ -108,6 +108,25 @@ impl Path {
         self
     }
 
+    /// Length of its pieces; beyond it goes straight on.
+    pub fn length_m(&self) -> f64 {
+        self.pieces.iter().map(|piece| piece.length_m).sum()
+    }
+
+    /// Places along it, from one way to another, half a metre apart at most.
+    pub fn points(&self, from_m: f64, to_m: f64) -> Vec<[f64; 2]> {
+        const APART_M: f64 = 0.5;
+        let steps = libm::ceil((to_m - from_m) / APART_M).max(1.0) as usize;
+        // A metre a second makes seconds metres.
+        let slow = self.clone().timed(&[(0.0, 1.0)]);
+        (0..=steps)
+            .map(|step| {
+                slow.at(from_m + (to_m - from_m) * step as f64 / steps as f64)
+                    .position_m
+            })
+            .collect()
+    }
+
     /// Moves the whole path.
     pub fn shift(&mut self, by_m: [f64; 2]) {
         for (metres, by_m) in self.start_m.iter_mut().zip(by_m) {

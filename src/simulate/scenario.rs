@@ -5,6 +5,7 @@ use super::scenery::Scenery;
 use super::scenes;
 use super::terrain::Terrain;
 use crate::random::Random;
+use crate::roadmap::Roadmap;
 
 /// What a road user is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -184,12 +185,19 @@ pub struct Scenario {
     /// What happens, in a line.
     pub summary: &'static str,
     pub(super) build: fn(&mut Random) -> Scene,
+    /// The map of its roads, if it has roundabouts.
+    pub(super) roads: Option<fn() -> Roadmap>,
 }
 
 impl Scenario {
     /// The scene of a seed: vehicles, sizes and speeds differ from seed to seed.
     pub fn scene(&self, seed: u64) -> Scene {
         (self.build)(&mut Random::new(seed))
+    }
+
+    /// The map of its roads, if it has roundabouts.
+    pub fn roads(&self) -> Option<Roadmap> {
+        self.roads.map(|make| make())
     }
 }
 

@@ -24,6 +24,9 @@ pub mod object_list;
 
 pub mod grid_tile;
 
+// Roundabouts and the gap.
+pub mod roundabout;
+
 pub mod status;
 
 pub mod opendlv;

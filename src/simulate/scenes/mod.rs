@@ -1,9 +1,11 @@
 //! The scenes themselves. Traffic drives on the right; x is east, y north.
 
+mod passage;
 mod places;
 mod roads;
 mod roundabouts;
 mod strangers;
+mod traffic;
 
 use super::path::Path;
 use super::scenario::{Actor, Scenario, Variant};
@@ -15,55 +17,78 @@ pub(super) const ALL: &[Scenario] = &[
         summary: "a small roundabout of 30 m: three cars, three cyclists, a pedestrian; the \
                   vehicle approaches, gives way, enters and leaves",
         build: roundabouts::roundabout,
+        roads: Some(roundabouts::small_roads),
     },
     Scenario {
         name: "roundabout-waiting",
         summary: "the same roundabout from an entry, where the vehicle stands and has no pose",
         build: roundabouts::roundabout_waiting,
+        roads: Some(roundabouts::waiting_roads),
     },
     Scenario {
         name: "mini-roundabout",
         summary: "a mini roundabout among hedges, trees and verges: two cars, a cyclist, two \
                   pedestrians side by side",
         build: roundabouts::mini_roundabout,
+        roads: Some(roundabouts::mini_roads),
+    },
+    Scenario {
+        name: "roundabout-traffic",
+        summary: "a small roundabout with cars that come from all arms and leave by all, two cyclists \
+                  and a pedestrian; the vehicle waits before the circle",
+        build: traffic::small,
+        roads: Some(traffic::small_roads),
+    },
+    Scenario {
+        name: "two-lane-roundabout",
+        summary: "the same with two lanes and an outer diameter of 42 m",
+        build: traffic::two_lane,
+        roads: Some(traffic::two_lane_roads),
     },
     Scenario {
         name: "street",
         summary: "a street with parked cars, oncoming traffic, a bus, a cyclist, pedestrians, \
                   and a turn to the right",
         build: roads::street,
+        roads: None,
     },
     Scenario {
         name: "car-park",
         summary: "a car park: two rows of parked cars, one that leaves, two pedestrians",
         build: places::car_park,
+        roads: None,
     },
     Scenario {
         name: "hill",
         summary: "a road over a hill, with verges and oncoming traffic",
         build: roads::hill,
+        roads: None,
     },
     Scenario {
         name: "occlusion",
         summary: "a standing sensor; cars, cyclists and pedestrians pass behind a lorry, a \
                   board and a van for a second or two",
         build: places::occlusion,
+        roads: None,
     },
     Scenario {
         name: "standing",
         summary: "a standing sensor beside a road, with traffic at all ranges",
         build: roads::standing,
+        roads: None,
     },
     Scenario {
         name: "strangers",
         summary: "a street that chance furnishes: parked vehicles, people with loads and in groups, \
                   traffic, hedges, walls, bins, signs; no two seeds are alike",
         build: strangers::strangers,
+        roads: None,
     },
     Scenario {
         name: "furniture",
         summary: "the same without any road user: vegetation and street furniture",
         build: strangers::furniture,
+        roads: None,
     },
 ];
 

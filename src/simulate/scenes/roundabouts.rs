@@ -1,58 +1,46 @@
 //! Roundabouts, large and small.
 
+use super::passage::{Circle, Passage, roads};
 use super::{LANE_M, RANGE_DEVIATION_M, SENSOR_M, about, actor};
 use crate::random::Random;
+use crate::roadmap::Roadmap;
 use crate::simulate::path::Path;
 use crate::simulate::scenario::{Actor, PoseMessages, Scene, Variant};
 use crate::simulate::scenery::Scenery;
 use crate::simulate::terrain::Terrain;
 
-/// A way through a roundabout: straight on in the right lane, a bend to the right that touches
-/// the circle, round to the exit, out.
-struct Passage {
-    centre_m: [f64; 2],
-    /// Of the way round.
-    radius_m: f64,
-    /// Of the bends in and out.
-    bend_m: f64,
-    /// From the middle of the approach road to the way in.
-    lane_m: f64,
-}
-
-impl Passage {
-    /// Driving towards `heading_deg` for `approach_m` before the bend, leaving at the exit with
-    /// this number, the right one being 1.
-    fn path(&self, heading_deg: f64, approach_m: f64, exit: u32) -> Path {
-        let touching_m = self.radius_m + self.bend_m;
-        let aside_m = self.bend_m + self.lane_m;
-        let before_m = libm::sqrt(touching_m * touching_m - aside_m * aside_m);
-        let bend_deg = libm::acos(aside_m / touching_m).to_degrees();
-        let round_deg = 2.0 * bend_deg + 90.0 * (f64::from(exit) - 2.0);
-        let (sine, cosine) = libm::sincos(heading_deg.to_radians());
-        let back_m = before_m + approach_m;
-        let [x, y] = self.centre_m;
-        let start_m = [
-            x - back_m * cosine + self.lane_m * sine,
-            y - back_m * sine - self.lane_m * cosine,
-        ];
-        Path::from(start_m, heading_deg)
-            .line(approach_m)
-            .arc(-self.bend_m, bend_deg)
-            .arc(self.radius_m, round_deg)
-            .arc(-self.bend_m, bend_deg)
-    }
-}
-
 const ROUND_CENTRE_M: [f64; 2] = [-LANE_M, 45.0];
+const SMALL: Passage = Passage {
+    centre_m: ROUND_CENTRE_M,
+    radius_m: 11.0,
+    bend_m: 12.0,
+    lane_m: LANE_M,
+};
+
+/// Its circles: lane, cycle path, pavement.
+pub(super) const SMALL_CIRCLES: [Circle; 3] = [
+    Circle::road(7.0, 15.0),
+    Circle::bikeway(15.6, 17.6),
+    Circle::pavement(19.2, 21.8),
+];
+
+pub(super) fn small_roads() -> Roadmap {
+    roads("roundabout", &[SMALL], &SMALL_CIRCLES)
+}
+
+/// Without a pose the sensor's first place is the origin: x to the right, y ahead.
+pub(super) fn waiting_roads() -> Roadmap {
+    let centre_m = [ROUND_CENTRE_M[0] + BACK_M[0], ROUND_CENTRE_M[1] + BACK_M[1]];
+    let shifted = Passage { centre_m, ..SMALL };
+    roads("roundabout-waiting", &[shifted], &SMALL_CIRCLES)
+}
+
+/// How far the waiting sensor's scene is moved so that the sensor is the origin of a frame without poses.
+const BACK_M: [f64; 2] = [0.0, -21.0];
 
 /// The scene of the thesis (section 2.2.2): outer diameter 30 m.
 pub(super) fn roundabout(random: &mut Random) -> Scene {
-    let passage = Passage {
-        centre_m: ROUND_CENTRE_M,
-        radius_m: 11.0,
-        bend_m: 12.0,
-        lane_m: LANE_M,
-    };
+    let passage = SMALL;
     let hurry = about(random, 0.01);
     let ego = passage.path(90.0, 26.6, 2).timed(&[
         (0.0, 8.3),
@@ -127,8 +115,6 @@ fn round_scenery() -> Scenery {
 
 /// As in the first figures of the thesis' tracking: standing, without a pose.
 pub(super) fn roundabout_waiting(random: &mut Random) -> Scene {
-    // The sensor is the origin of a frame without poses.
-    const BACK_M: [f64; 2] = [0.0, -21.0];
     let mut scene = roundabout(random);
     for actor in &mut scene.actors {
         actor.path.shift(BACK_M);
@@ -141,14 +127,20 @@ pub(super) fn roundabout_waiting(random: &mut Random) -> Scene {
     }
 }
 
+const MINI: Passage = Passage {
+    centre_m: [-LANE_M, 38.0],
+    radius_m: 6.5,
+    bend_m: 9.0,
+    lane_m: LANE_M,
+};
+
+pub(super) fn mini_roads() -> Roadmap {
+    roads("mini-roundabout", &[MINI], &[Circle::road(3.2, 9.0)])
+}
+
 pub(super) fn mini_roundabout(random: &mut Random) -> Scene {
-    let centre_m = [-LANE_M, 38.0];
-    let passage = Passage {
-        centre_m,
-        radius_m: 6.5,
-        bend_m: 9.0,
-        lane_m: LANE_M,
-    };
+    let centre_m = MINI.centre_m;
+    let passage = MINI;
     let terrain = Terrain {
         swells: vec![],
         unevenness_m: 0.04,

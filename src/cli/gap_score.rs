@@ -1,0 +1,314 @@
+//! Advice at a roundabout beside a recording's truth: the same rule on true road users, and what
+//! they did then.
+
+use std::collections::BTreeMap;
+
+use crate::roadmap::{LaneKind, Roadmap};
+use crate::roundabout::{Advice, Place, RoundaboutParameters, Situation, Watcher};
+use crate::time::Time;
+use crate::track::{Class, Object};
+
+/// A gap that one should not miss.
+const LONG_GAP_S: f64 = 4.0;
+/// Announcements that are wrong by more than this are no matter of rounding.
+const CLEARLY_S: f64 = 0.25;
+/// Times to the conflict point are compared from so early.
+const HORIZON_S: std::ops::Range<f64> = 2.5..3.5;
+/// Stay or exit is judged so long before the conflict point.
+const JUDGED_S: f64 = 1.5;
+/// Farther apart are two different things.
+const MATCH_M: f64 = 2.0;
+
+/// Figures so far.
+#[derive(Debug)]
+pub(super) struct GapScore {
+    truth: Watcher,
+    arms: Vec<ArmScore>,
+    revolutions: usize,
+    agreed: usize,
+    /// Times that road users were said to come, by true road user and arm: when it was said, and when they
+    /// should come.
+    expected: ByComer<Vec<f64>>,
+    errors_s: Vec<f64>,
+    /// What was said of staying, by true road user and arm: last before the judgement.
+    stays: ByComer<bool>,
+    judged: [usize; 2],
+    /// Right and all, of cars and of cyclists.
+    lanes: [[usize; 2]; 2],
+}
+
+#[derive(Debug, Default)]
+struct ArmScore {
+    was_open: bool,
+    announced: usize,
+    unsafe_goes: usize,
+    clearly_unsafe: usize,
+    /// The true gap that lasts: whether it was announced.
+    gap: Option<bool>,
+    gaps: usize,
+    missed: usize,
+}
+
+impl GapScore {
+    pub(super) fn new(parameters: &RoundaboutParameters, roads: &Roadmap) -> Self {
+        let mut truth = Watcher::new(parameters);
+        truth.take_map(roads);
+        Self {
+            truth,
+            arms: vec![],
+            revolutions: 0,
+            agreed: 0,
+            expected: BTreeMap::new(),
+            errors_s: vec![],
+            stays: BTreeMap::new(),
+            judged: [0; 2],
+            lanes: [[0; 2]; 2],
+        }
+    }
+
+    /// Compares a revolution's advice with what the same rule says of true road users.
+    pub(super) fn take(&mut self, advice: &Advice, objects: &[Object], truth: &Situation<'_>) {
+        self.truth.watch(truth);
+        let Some(true_advice) = self.truth.advice() else {
+            return;
+        };
+        self.arms
+            .resize_with(true_advice.arms.len(), ArmScore::default);
+        self.revolutions += true_advice.arms.len();
+        for ((score, said), known) in self
+            .arms
+            .iter_mut()
+            .zip(&advice.arms)
+            .zip(&true_advice.arms)
+        {
+            self.agreed += usize::from(said.may_enter == known.may_enter);
+            score.take(said.may_enter, known.may_enter, known.margin_s, known.gap_s);
+        }
+        let pairs = pairs(objects, truth.objects);
+        compare_lanes(&mut self.lanes, advice, true_advice, truth.objects, &pairs);
+        let now_s = truth.time.seconds();
+        let ours: BTreeMap<u32, u32> = pairs.iter().map(|&(object, user)| (user, object)).collect();
+        let on_circle = |windows: &'_ Advice| -> ByComer<(f64, f64)> {
+            let windows = windows
+                .windows
+                .iter()
+                .filter(|window| window.kind == LaneKind::Road);
+            windows
+                .map(|window| {
+                    (
+                        (window.object_id, window.arm),
+                        (window.expected_s, window.probability),
+                    )
+                })
+                .collect()
+        };
+        let (said, known) = (on_circle(advice), on_circle(true_advice));
+        for (&(user, arm), &(true_s, _)) in &known {
+            if true_s <= 0.0 {
+                // It has come: all that was said of when is judged by now.
+                let predictions = self.expected.remove(&(user, arm)).unwrap_or_default();
+                self.errors_s
+                    .extend(predictions.iter().map(|at_s| (at_s - now_s).abs()));
+                if let Some(stays) = self.stays.remove(&(user, arm)) {
+                    self.judged[0] += usize::from(stays);
+                    self.judged[1] += 1;
+                }
+                continue;
+            }
+            let Some(&object) = ours.get(&user) else {
+                continue;
+            };
+            let window = said.get(&(object, arm));
+            if let Some((expected_s, _)) = window.filter(|_| HORIZON_S.contains(&true_s)) {
+                self.expected
+                    .entry((user, arm))
+                    .or_default()
+                    .push(now_s + expected_s);
+            }
+            if true_s >= JUDGED_S {
+                let stays = window.is_some_and(|(_, probability)| *probability >= 0.5);
+                self.stays.insert((user, arm), stays);
+            }
+        }
+        judge_leavers(
+            true_advice,
+            &mut self.expected,
+            &mut self.stays,
+            &mut self.judged,
+        );
+    }
+
+    /// One line for people, and for scripts.
+    pub(super) fn summary(&self) -> String {
+        let sum = |count: fn(&ArmScore) -> usize| self.arms.iter().map(count).sum::<usize>();
+        let share = |[right, all]: [usize; 2]| format!("{right} of {all}");
+        let missed = sum(|arm| arm.missed)
+            + self
+                .arms
+                .iter()
+                .filter(|arm| arm.gap == Some(false))
+                .count();
+        let gaps = sum(|arm| arm.gaps);
+        let mut errors_s = self.errors_s.clone();
+        errors_s.sort_by(f64::total_cmp);
+        let quantile = |part: f64| {
+            let index = (part * errors_s.len() as f64) as usize;
+            errors_s
+                .get(index.min(errors_s.len().saturating_sub(1)))
+                .copied()
+                .unwrap_or(0.0)
+        };
+        format!(
+            "gaps at {} arms in {} decisions, of which {} agree with the rule on true road users: \
+             {} announced, {} unsafe, {} by more than {CLEARLY_S} s; {missed} of {gaps} true gaps of \
+             {LONG_GAP_S} s missed; time to the conflict point at 3 s off by {:.2} s median, {:.2} s at \
+             95 % of {}; stay or exit right {}; lane right: cars {}, cyclists {}",
+            self.arms.len(),
+            self.revolutions,
+            self.agreed,
+            sum(|arm| arm.announced),
+            sum(|arm| arm.unsafe_goes),
+            sum(|arm| arm.clearly_unsafe),
+            quantile(0.5),
+            quantile(0.95),
+            errors_s.len(),
+            share(self.judged),
+            share(self.lanes[0]),
+            share(self.lanes[1]),
+        )
+    }
+}
+
+impl ArmScore {
+    fn take(&mut self, said: bool, known: bool, margin_s: f64, gap_s: f64) {
+        if said && !self.was_open {
+            self.announced += 1;
+            self.unsafe_goes += usize::from(!known);
+            self.clearly_unsafe += usize::from(!known && margin_s < 2.0 - CLEARLY_S);
+        }
+        self.was_open = said;
+        match (&mut self.gap, known) {
+            (Some(announced), true) => *announced |= said,
+            (Some(announced), false) => {
+                self.missed += usize::from(!*announced);
+                self.gap = None;
+            }
+            (None, true) if gap_s >= LONG_GAP_S => {
+                self.gaps += 1;
+                self.gap = Some(said);
+            }
+            (None, _) => {}
+        }
+    }
+}
+
+/// By true road user and arm.
+type ByComer<T> = BTreeMap<(u32, usize), T>;
+
+/// Who is truly on a way out does not come to that arm.
+fn judge_leavers(
+    known: &Advice,
+    expected: &mut ByComer<Vec<f64>>,
+    stays: &mut ByComer<bool>,
+    judged: &mut [usize; 2],
+) {
+    for user in known.users.iter().filter(|user| user.on.probability > 0.99) {
+        let Place::Exit(arm, _) = user.on.place else {
+            continue;
+        };
+        expected.remove(&(user.object_id, arm));
+        if let Some(stays) = stays.remove(&(user.object_id, arm)) {
+            judged[0] += usize::from(!stays);
+            judged[1] += 1;
+        }
+    }
+}
+
+/// Ids of objects and true road users that are one, the closest first.
+fn pairs(objects: &[Object], users: &[Object]) -> Vec<(u32, u32)> {
+    let mut all: Vec<(f64, u32, u32)> = vec![];
+    for object in objects {
+        for user in users {
+            let [x, y] = [0, 1].map(|axis| object.centre_m[axis] - user.centre_m[axis]);
+            let away_m = libm::hypot(x, y);
+            if away_m < MATCH_M {
+                all.push((away_m, object.id, user.id));
+            }
+        }
+    }
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut found: Vec<(u32, u32)> = vec![];
+    for (_, object, user) in all {
+        if !found
+            .iter()
+            .any(|known| known.0 == object || known.1 == user)
+        {
+            found.push((object, user));
+        }
+    }
+    found
+}
+
+/// Whether road users are on the lanes on which the rule puts them that knows them.
+fn compare_lanes(
+    lanes: &mut [[usize; 2]; 2],
+    said: &Advice,
+    known: &Advice,
+    users: &[Object],
+    pairs: &[(u32, u32)],
+) {
+    let place = |advice: &Advice, id: u32| {
+        let user = advice.users.iter().find(|user| user.object_id == id);
+        user.map(|user| user.on.place)
+    };
+    for &(object, user) in pairs {
+        let class = users.iter().find(|one| one.id == user).map(|one| one.class);
+        let kind = match class {
+            Some(Class::Car | Class::LargeVehicle) => 0,
+            Some(Class::Cyclist) => 1,
+            _ => continue,
+        };
+        let Some(place_of_user) = place(known, user) else {
+            continue;
+        };
+        lanes[kind][0] += usize::from(place(said, object) == Some(place_of_user));
+        lanes[kind][1] += 1;
+    }
+}
+
+/// A true road user as an object that is surely known.
+pub(super) struct TrueState {
+    pub(super) id: u32,
+    pub(super) class: Class,
+    pub(super) place_m: [f64; 2],
+    pub(super) yaw_rad: f64,
+    pub(super) speed_mps: f64,
+    pub(super) yaw_rate_radps: f64,
+    pub(super) size_m: [f64; 3],
+}
+
+impl TrueState {
+    pub(super) fn object(&self, time: Time) -> Object {
+        Object {
+            id: self.id,
+            class: self.class,
+            class_probability: 1.0,
+            measured: true,
+            centre_m: [self.place_m[0], self.place_m[1], 0.0],
+            yaw_rad: self.yaw_rad,
+            speed_mps: self.speed_mps,
+            yaw_rate_radps: self.yaw_rate_radps,
+            length_m: self.size_m[0],
+            width_m: self.size_m[1],
+            height_m: self.size_m[2],
+            position_deviation_m: [0.0; 2],
+            yaw_deviation_rad: 0.0,
+            speed_deviation_mps: 0.0,
+            existence: 1.0,
+            first_seen: time,
+            seen_since: time,
+            last_measured: time,
+            points: 0,
+        }
+    }
+}

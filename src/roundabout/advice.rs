@@ -1,0 +1,187 @@
+//! What is said of a roundabout, and of each arm.
+
+use super::gap::{self, OwnMotion};
+use super::lanes::OnLane;
+use super::sight::Unseen;
+use super::site::{Entry, Site};
+use super::{RoundaboutParameters, Window};
+use crate::roadmap::LaneKind;
+
+/// How far the vehicle has come (thesis: start, to the roundabout, brake, in the roundabout,
+/// exit).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum State {
+    /// The vehicle is at no arm: a watcher beside the road, or far away.
+    #[default]
+    Watching,
+    /// On its way in, with more way than it needs to brake.
+    Approaching,
+    /// It has to brake now, or stands before the circle.
+    Braking,
+    /// On the circle.
+    Circling,
+    /// On the way out.
+    Leaving,
+}
+
+impl State {
+    /// The number in `kreisel.Roundabout`.
+    pub const fn number(self) -> u32 {
+        match self {
+            Self::Watching => 0,
+            Self::Approaching => 1,
+            Self::Braking => 2,
+            Self::Circling => 3,
+            Self::Leaving => 4,
+        }
+    }
+
+    /// For people.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Watching => "watching",
+            Self::Approaching => "approaching",
+            Self::Braking => "braking",
+            Self::Circling => "circling",
+            Self::Leaving => "leaving",
+        }
+    }
+}
+
+/// Why one should not enter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hindrance {
+    /// A road user who comes, or is in the way.
+    RoadUser(u32),
+    /// Somebody may come from where nothing is seen.
+    Unseen,
+    /// The arm has no way in.
+    NoEntry,
+}
+
+/// What is said of an arm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArmAdvice {
+    /// Direction of the arm from the middle, counter-clockwise from east.
+    pub bearing_rad: f64,
+    /// Whether the gap is long enough.
+    pub may_enter: bool,
+    /// Why not.
+    pub hindrance: Option<Hindrance>,
+    /// Until the next road user may come to the circle's conflict point, seconds.
+    pub gap_s: f64,
+    /// When the vehicle would come to the first conflict point and leave the last one: the own one as it
+    /// goes, at other arms one that stands before it.
+    pub own_window_s: [f64; 2],
+    /// What is left of the gap when the vehicle is past, least of all conflict points.
+    pub margin_s: f64,
+    /// Share of the circle on which nobody can be who was not seen.
+    pub seen_share: f64,
+}
+
+/// A road user's lane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UserOnLane {
+    /// Whose.
+    pub object_id: u32,
+    /// The likeliest lane.
+    pub on: OnLane,
+}
+
+/// What is said of the nearest roundabout in a revolution.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Advice {
+    /// As the map calls it.
+    pub name: String,
+    /// Middle in the local frame.
+    pub centre_m: [f64; 2],
+    /// Outer diameter.
+    pub diameter_m: f64,
+    /// How far the vehicle has come.
+    pub state: State,
+    /// The arm that the vehicle is at.
+    pub own_arm: Option<usize>,
+    /// In the map's order.
+    pub arms: Vec<ArmAdvice>,
+    /// Of all road users at all arms.
+    pub windows: Vec<Window>,
+    /// Road users on lanes.
+    pub users: Vec<UserOnLane>,
+}
+
+impl ArmAdvice {
+    /// An arm without a way in.
+    pub(super) fn closed(bearing_rad: f64) -> Self {
+        Self {
+            bearing_rad,
+            may_enter: false,
+            hindrance: Some(Hindrance::NoEntry),
+            gap_s: 0.0,
+            own_window_s: [0.0; 2],
+            margin_s: 0.0,
+            seen_share: 0.0,
+        }
+    }
+
+    /// Whether the vehicle, as it goes, fits between those who come and those whom nobody sees.
+    pub(super) fn of(
+        site: &Site,
+        bearing_rad: f64,
+        entry: &Entry,
+        motion: &OwnMotion,
+        comers: &[Window],
+        unseen: Option<&Unseen>,
+        parameters: &RoundaboutParameters,
+    ) -> Self {
+        let mut advice = Self {
+            bearing_rad,
+            may_enter: true,
+            hindrance: None,
+            gap_s: gap::HORIZON_S,
+            own_window_s: [f64::INFINITY, 0.0],
+            margin_s: gap::HORIZON_S,
+            seen_share: 1.0,
+        };
+        for (number, conflict) in entry.conflicts.iter().enumerate() {
+            let [begin_s, end_s] = motion.window_s(site, conflict, parameters);
+            if end_s <= 0.0 {
+                // Past it already.
+                continue;
+            }
+            advice.own_window_s = [
+                advice.own_window_s[0].min(begin_s),
+                advice.own_window_s[1].max(end_s),
+            ];
+            let at_point = comers.iter().filter(|window| window.conflict == number);
+            for window in at_point {
+                // Gone before the vehicle comes.
+                if window.end_s + gap::BEHIND_S <= begin_s {
+                    continue;
+                }
+                let margin_s = window.begin_s - end_s;
+                advice.gap_s = advice.gap_s.min(window.begin_s);
+                if margin_s < advice.margin_s {
+                    advice.margin_s = margin_s;
+                    if margin_s < parameters.margin_s {
+                        advice.hindrance = Some(Hindrance::RoadUser(window.object_id));
+                    }
+                }
+            }
+            if let Some(unseen) = unseen
+                && conflict.kind == LaneKind::Road
+            {
+                let (away_m, seen_share) = unseen.before(site, conflict.angle_rad);
+                advice.seen_share = seen_share;
+                let comes_s = away_m.map_or(f64::INFINITY, |away_m| away_m / parameters.speed_mps);
+                if comes_s - end_s < parameters.margin_s && advice.hindrance.is_none() {
+                    advice.hindrance = Some(Hindrance::Unseen);
+                }
+            }
+        }
+        if !advice.own_window_s[0].is_finite() {
+            advice.own_window_s[0] = 0.0;
+        }
+        advice.may_enter = advice.hindrance.is_none();
+        advice
+    }
+}

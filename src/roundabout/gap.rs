@@ -1,0 +1,228 @@
+//! The gap: when road users are where the own way crosses theirs, and whether it fits between.
+
+use std::f64::consts::TAU;
+
+use super::RoundaboutParameters;
+use super::lanes::{OnLane, Place};
+use super::site::{Conflict, Entry, Site};
+use crate::roadmap::LaneKind;
+use crate::track::Object;
+
+/// When a road user is at a conflict point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Window {
+    /// Whose.
+    pub object_id: u32,
+    /// At which arm's way in.
+    pub arm: usize,
+    /// Which conflict point of that way, in the order in which they are met.
+    pub conflict: usize,
+    /// Of the way that is crossed.
+    pub kind: LaneKind,
+    /// From now, seconds: as early as it may come.
+    pub begin_s: f64,
+    /// From now: as late as it may be gone.
+    pub end_s: f64,
+    /// From now: when its front most likely comes.
+    pub expected_s: f64,
+    /// Probability that it comes at all.
+    pub probability: f64,
+    /// Way that is left to the conflict point.
+    pub way_m: f64,
+}
+
+/// The own vehicle on its way in: how far its front is from the end of the way, and its speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct OwnMotion {
+    /// Place of its front along the way in.
+    pub(super) front_m: f64,
+    pub(super) speed_mps: f64,
+}
+
+/// A road user with the lanes that it may be on.
+pub(super) struct User<'a> {
+    pub(super) object: &'a Object,
+    pub(super) lanes: &'a [OnLane],
+}
+
+/// Windows farther off than this are not told.
+pub(super) const HORIZON_S: f64 = 15.0;
+/// Who comes with less than this probability is not waited for.
+pub(super) const LEAST_PROBABILITY: f64 = 0.1;
+/// Slower road users do not come: they wait.
+const WAITS_MPS: f64 = 0.5;
+/// Time that a road user must have been gone before the vehicle comes.
+pub(super) const BEHIND_S: f64 = 0.3;
+/// Standard deviations that a window is widened by at either end.
+const DEVIATIONS: f64 = 2.0;
+/// Probability that one who is on the circle stays there at an exit that he is not seen to take:
+/// unknown.
+const STAYS: f64 = 0.6;
+
+impl OwnMotion {
+    /// When the front has gone so far, by the stated acceleration up to the stated speed.
+    pub(super) fn time_s(&self, way_m: f64, parameters: &RoundaboutParameters) -> f64 {
+        let way_m = way_m.max(0.0);
+        let (a, top) = (parameters.acceleration_mps2, parameters.speed_mps);
+        let from = self.speed_mps.clamp(0.0, top);
+        let rise_m = (top * top - from * from) / (2.0 * a);
+        if way_m <= rise_m {
+            (libm::sqrt(from * from + 2.0 * a * way_m) - from) / a
+        } else {
+            (top - from) / a + (way_m - rise_m) / top
+        }
+    }
+
+    /// From when to when the vehicle is at a conflict point of its way in.
+    pub(super) fn window_s(
+        &self,
+        site: &Site,
+        conflict: &Conflict,
+        parameters: &RoundaboutParameters,
+    ) -> [f64; 2] {
+        let half_m = site.rings[conflict.ring].width_m / 2.0;
+        let reach_m = conflict.along_m - half_m - self.front_m;
+        let clear_m = conflict.along_m + half_m + parameters.own_length_m - self.front_m;
+        // Where the way ends on the circle the vehicle does not cross it: it is gone from the
+        // point when its rear is past it.
+        let clear_m = if conflict.kind == LaneKind::Road {
+            clear_m - half_m
+        } else {
+            clear_m
+        };
+        [reach_m, clear_m].map(|way_m| self.time_s(way_m, parameters))
+    }
+}
+
+/// The windows of a road user at the conflict points of a way in.
+pub(super) fn windows(
+    site: &Site,
+    arm: usize,
+    entry: &Entry,
+    user: &User<'_>,
+    found: &mut Vec<Window>,
+) {
+    for (number, conflict) in entry.conflicts.iter().enumerate() {
+        let zone_m = entry.width_m / 2.0;
+        let ways = user.lanes.iter().filter_map(|on| {
+            let (way_m, probability) = way_to(site, arm, conflict, on)?;
+            Some((way_m, on.speed_mps.abs(), probability * on.probability))
+        });
+        let mut best: Option<Window> = None;
+        for (way_m, speed_mps, probability) in ways {
+            let Some(window) = window(user.object, way_m, speed_mps, zone_m) else {
+                continue;
+            };
+            let window = Window {
+                arm,
+                conflict: number,
+                kind: conflict.kind,
+                ..window
+            };
+            best = Some(match best {
+                // Lanes that lead to the same point: as early as by any, as probable as by all.
+                Some(known) => Window {
+                    begin_s: known.begin_s.min(window.begin_s),
+                    end_s: known.end_s.max(window.end_s),
+                    probability: known.probability + probability,
+                    ..known
+                },
+                None => Window {
+                    probability,
+                    ..window
+                },
+            });
+        }
+        found.extend(best.filter(|window| {
+            window.probability >= LEAST_PROBABILITY && window.begin_s < HORIZON_S
+        }));
+    }
+}
+
+/// How far it is for the middle of somebody on a lane to a conflict point, negative behind it, and
+/// how probably the way leads there.
+fn way_to(site: &Site, arm: usize, conflict: &Conflict, on: &OnLane) -> Option<(f64, f64)> {
+    let ring = &site.rings[conflict.ring];
+    let radius_m = ring.circle.radius_m;
+    // Behind the point by less than this is behind it, and not almost all the way round.
+    let behind = |way_m: f64| {
+        const BEHIND_M: f64 = 12.0;
+        if way_m > TAU * radius_m - BEHIND_M {
+            way_m - TAU * radius_m
+        } else {
+            way_m
+        }
+    };
+    match on.place {
+        Place::Ring(index) => {
+            let own = &site.rings[index];
+            if own.kind != conflict.kind {
+                return None;
+            }
+            let angle_rad = on.along_m / own.circle.radius_m;
+            let round_rad = if on.speed_mps < 0.0 {
+                site.round_rad(conflict.angle_rad, angle_rad)
+            } else {
+                site.round_rad(angle_rad, conflict.angle_rad)
+            };
+            let way_m = behind(own.circle.radius_m * round_rad);
+            let exits = if own.kind == LaneKind::Road && way_m > 0.0 {
+                exits_between(site, angle_rad, round_rad)
+            } else {
+                0
+            };
+            Some((way_m, libm::pow(STAYS, f64::from(exits))))
+        }
+        Place::Entry(other, lane) if conflict.kind == LaneKind::Road && other != arm => {
+            let way = &site.arms[other].entries[lane].way;
+            let met_rad = site.angle_rad(way.at(way.length_m()).0);
+            let round_rad = site.round_rad(met_rad, conflict.angle_rad);
+            let exits = exits_between(site, met_rad, round_rad);
+            let way_m = way.length_m() - on.along_m + radius_m * round_rad;
+            Some((way_m, libm::pow(STAYS, f64::from(exits))))
+        }
+        _ => None,
+    }
+}
+
+/// Exits whose mouth lies ahead on the way round, up to a point.
+fn exits_between(site: &Site, angle_rad: f64, round_rad: f64) -> i32 {
+    let exits = site.arms.iter().filter_map(|arm| arm.exits.first());
+    let ahead = exits.filter(|exit| site.round_rad(angle_rad, exit.mouth_rad) < round_rad);
+    ahead.count() as i32
+}
+
+/// The window of somebody who has so far to go to a conflict point that reaches so far along the way.
+fn window(object: &Object, way_m: f64, speed_mps: f64, zone_m: f64) -> Option<Window> {
+    let [x, y] = object.position_deviation_m;
+    let blur_m = DEVIATIONS * x.max(y).min(2.0);
+    let half_m = object.length_m / 2.0 + zone_m;
+    let (front_m, rear_m) = (way_m - half_m, way_m + half_m);
+    let blur_mps = DEVIATIONS * object.speed_deviation_mps;
+    let blank = Window {
+        object_id: object.id,
+        arm: 0,
+        conflict: 0,
+        kind: LaneKind::Road,
+        begin_s: 0.0,
+        end_s: 0.0,
+        expected_s: 0.0,
+        probability: 0.0,
+        way_m,
+    };
+    if speed_mps < WAITS_MPS {
+        // Who stands where the ways cross is in the way as long as he stands.
+        let is_there = front_m <= 0.0 && rear_m >= 0.0;
+        let end_s = HORIZON_S;
+        return is_there.then_some(Window { end_s, ..blank });
+    }
+    let (slow_mps, fast_mps) = ((speed_mps - blur_mps).max(WAITS_MPS), speed_mps + blur_mps);
+    let begin_s = ((front_m - blur_m) / fast_mps).max(0.0);
+    let end_s = ((rear_m + blur_m) / slow_mps).max((rear_m + blur_m) / fast_mps);
+    (end_s > 0.0).then_some(Window {
+        begin_s,
+        end_s,
+        expected_s: ((way_m - object.length_m / 2.0) / speed_mps).max(0.0),
+        ..blank
+    })
+}

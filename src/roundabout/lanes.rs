@@ -1,0 +1,246 @@
+//! Which lane a road user is on: a Bayes filter over the lanes, by place, heading, turn and class.
+
+use super::site::Site;
+use crate::ego::wrapped_rad;
+use crate::roadmap::LaneKind;
+use crate::track::{Class, Object};
+
+/// A lane of the site.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Place {
+    /// On a ring of this number.
+    Ring(usize),
+    /// On the way in of an arm: arm, lane.
+    Entry(usize, usize),
+    /// On the way out of an arm: arm, lane.
+    Exit(usize, usize),
+    /// On none.
+    Elsewhere,
+}
+
+/// Where on a lane somebody is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OnLane {
+    /// The lane.
+    pub place: Place,
+    /// Probability that it is this one.
+    pub probability: f64,
+    /// Along it: on a ring from east, counter-clockwise; on a way from its beginning.
+    pub along_m: f64,
+    /// To the left of its middle positive; on a ring, outward.
+    pub offset_m: f64,
+    /// Along it positive: speed as far as it leads along the lane.
+    pub speed_mps: f64,
+}
+
+/// What the filter remembers of a road user: lanes with their probabilities.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Belief {
+    lanes: Vec<(Place, f64)>,
+}
+
+/// Lanes less probable than this are not told.
+pub(super) const LEAST_PROBABILITY: f64 = 0.01;
+/// Share of the belief that is forgotten at each revolution: who was surely on a lane may be on
+/// another one half a second later.
+const FORGOTTEN: f64 = 0.2;
+/// Road users keep to the middle of a lane within this share of its width (standard deviation).
+const WIDTH_SHARE: f64 = 0.25;
+/// And to its direction.
+const HEADING_RAD: f64 = 0.2;
+/// And to its curvature.
+const YAW_RATE_RADPS: f64 = 0.2;
+/// Slower ones have no heading that says anything.
+const MOVING_MPS: f64 = 0.7;
+/// Density of road users beside all lanes, in place of a lane's by place and heading.
+const ELSEWHERE: f64 = 0.02;
+/// Longest time that a belief is kept of somebody who is not listed, in revolutions, is none:
+/// identities are the tracker's.
+const CLASSES: [(Class, [f64; 3]); 4] = [
+    // Share of those met near a roundabout on roads, bikeways and pavements.
+    (Class::Car, [0.98, 0.01, 0.01]),
+    (Class::LargeVehicle, [0.98, 0.01, 0.01]),
+    (Class::Cyclist, [0.27, 0.70, 0.03]),
+    (Class::Pedestrian, [0.05, 0.15, 0.80]),
+];
+
+/// Share of a class's members that use ways of a kind.
+fn share(class: Class, kind: LaneKind) -> f64 {
+    let index = LaneKind::ALL.iter().position(|&other| other == kind);
+    let known = CLASSES.iter().find(|(other, _)| *other == class);
+    let shares = known.map_or([1.0 / 3.0; 3], |(_, shares)| *shares);
+    shares[index.unwrap_or(0)]
+}
+
+/// One lane as it may hold a road user.
+struct Candidate {
+    on: OnLane,
+    likelihood: f64,
+}
+
+impl Belief {
+    /// Takes in where a road user is now; gives the lanes that it may be on, the likeliest first.
+    pub(super) fn update(&mut self, site: &Site, object: &Object, found: &mut Vec<OnLane>) {
+        let mut candidates = vec![Candidate {
+            on: OnLane {
+                place: Place::Elsewhere,
+                probability: 0.0,
+                along_m: 0.0,
+                offset_m: 0.0,
+                speed_mps: object.speed_mps,
+            },
+            likelihood: ELSEWHERE,
+        }];
+        candidates.extend((0..site.rings.len()).filter_map(|ring| on_ring(site, ring, object)));
+        for (arm, ways) in site.arms.iter().enumerate() {
+            let entries = ways.entries.iter().map(|entry| (&entry.way, entry.width_m));
+            let entries = (0..)
+                .zip(entries)
+                .map(|(lane, way)| (Place::Entry(arm, lane), way));
+            let exits = ways.exits.iter().map(|exit| (&exit.way, exit.width_m));
+            let exits = (0..)
+                .zip(exits)
+                .map(|(lane, way)| (Place::Exit(arm, lane), way));
+            candidates.extend(
+                entries
+                    .chain(exits)
+                    .filter_map(|(place, (way, width_m))| on_way(place, way, width_m, object)),
+            );
+        }
+        // Nobody knows where somebody is who was never seen.
+        let fresh = 1.0 / candidates.len() as f64;
+        let prior = |place: Place| {
+            let known = self.lanes.iter().find(|(other, _)| *other == place);
+            let kept = known.map_or(0.0, |(_, probability)| *probability);
+            if self.lanes.is_empty() {
+                fresh
+            } else {
+                (1.0 - FORGOTTEN) * kept + FORGOTTEN * fresh
+            }
+        };
+        let weights: Vec<f64> = candidates
+            .iter()
+            .map(|candidate| candidate.likelihood * prior(candidate.on.place))
+            .collect();
+        let sum: f64 = weights.iter().sum();
+        self.lanes.clear();
+        found.clear();
+        for (candidate, weight) in candidates.into_iter().zip(weights) {
+            let probability = weight / sum;
+            self.lanes.push((candidate.on.place, probability));
+            if probability >= LEAST_PROBABILITY {
+                found.push(OnLane {
+                    probability,
+                    ..candidate.on
+                });
+            }
+        }
+        found.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    }
+}
+
+/// Direction of motion: a box that goes backwards moves against its yaw.
+pub(super) fn course(object: &Object) -> (f64, f64) {
+    if object.speed_mps < 0.0 {
+        (
+            wrapped_rad(object.yaw_rad + std::f64::consts::PI),
+            -object.speed_mps,
+        )
+    } else {
+        (object.yaw_rad, object.speed_mps)
+    }
+}
+
+fn gauss(off: f64, deviation: f64) -> f64 {
+    libm::exp(-0.5 * (off / deviation) * (off / deviation))
+}
+
+/// How well the motion fits a lane that leads somewhere with a curvature.
+fn motion_fit(object: &Object, heading_rad: f64, curvature_per_m: f64) -> f64 {
+    let (course_rad, speed_mps) = course(object);
+    if speed_mps < MOVING_MPS {
+        return 1.0;
+    }
+    let heading_deviation_rad = libm::hypot(HEADING_RAD, object.yaw_deviation_rad);
+    let off_rad = wrapped_rad(course_rad - heading_rad);
+    let off_radps = object.yaw_rate_radps - speed_mps * curvature_per_m;
+    gauss(off_rad, heading_deviation_rad) * gauss(off_radps, YAW_RATE_RADPS + 0.05 * speed_mps)
+}
+
+fn place_fit(object: &Object, offset_m: f64, width_m: f64) -> f64 {
+    let [x, y] = object.position_deviation_m;
+    let deviation_m = libm::hypot(WIDTH_SHARE * width_m, x.max(y));
+    gauss(offset_m, deviation_m)
+}
+
+fn on_ring(site: &Site, index: usize, object: &Object) -> Option<Candidate> {
+    let ring = &site.rings[index];
+    let at_m = [object.centre_m[0], object.centre_m[1]];
+    let offset_m = ring.circle.off_m(at_m);
+    if offset_m.abs() > 2.0 * ring.width_m {
+        return None;
+    }
+    let angle_rad = ring.circle.angle_rad(at_m);
+    let tangent_rad = site.tangent_rad(angle_rad);
+    let side = if site.is_clockwise { -1.0 } else { 1.0 };
+    let along = motion_fit(object, tangent_rad, side / ring.circle.radius_m);
+    let back_rad = wrapped_rad(tangent_rad + std::f64::consts::PI);
+    // On foot one goes both ways.
+    let (fit, is_along) = if ring.kind == LaneKind::Pavement {
+        let against = motion_fit(object, back_rad, -side / ring.circle.radius_m);
+        (along.max(against), along >= against)
+    } else {
+        (along, true)
+    };
+    let (course_rad, speed_mps) = course(object);
+    let heading_rad = if is_along { tangent_rad } else { back_rad };
+    let leads_mps = speed_mps * libm::cos(course_rad - heading_rad);
+    Some(Candidate {
+        on: OnLane {
+            place: Place::Ring(index),
+            probability: 0.0,
+            along_m: ring.circle.radius_m * angle_rad,
+            offset_m,
+            speed_mps: if is_along { leads_mps } else { -leads_mps },
+        },
+        likelihood: place_fit(object, offset_m, ring.width_m)
+            * fit
+            * share(object.class, ring.kind),
+    })
+}
+
+fn on_way(
+    place: Place,
+    way: &crate::roadmap::Polyline,
+    width_m: f64,
+    object: &Object,
+) -> Option<Candidate> {
+    let station = way.nearest([object.centre_m[0], object.centre_m[1]])?;
+    // Before the beginning or behind the end it is another lane's.
+    if station.distance_m > 2.0 * width_m || station.distance_m > station.offset_m.abs() + 1.0 {
+        return None;
+    }
+    let curvature_per_m = curvature_per_m(way, station.along_m);
+    let (course_rad, speed_mps) = course(object);
+    let fit = motion_fit(object, station.heading_rad, curvature_per_m);
+    Some(Candidate {
+        on: OnLane {
+            place,
+            probability: 0.0,
+            along_m: station.along_m,
+            offset_m: station.offset_m,
+            speed_mps: speed_mps * libm::cos(course_rad - station.heading_rad),
+        },
+        likelihood: place_fit(object, station.offset_m, width_m)
+            * fit
+            * share(object.class, LaneKind::Road),
+    })
+}
+
+/// By the directions a little before and after.
+fn curvature_per_m(way: &crate::roadmap::Polyline, along_m: f64) -> f64 {
+    const STEP_M: f64 = 2.0;
+    let [(_, before_rad), (_, after_rad)] =
+        [-STEP_M, STEP_M].map(|step_m| way.at(along_m + step_m));
+    wrapped_rad(after_rad - before_rad) / (2.0 * STEP_M)
+}

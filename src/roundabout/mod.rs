@@ -1,0 +1,262 @@
+//! May one enter now? Road users on the lanes of a roundabout that a map knows, and the gap
+//! between them (the thesis' question; the elements are those of its section 2.2).
+//!
+//! A layer of its own behind the tracks: it changes no object, and without a map it costs nothing.
+//! It advises, and is no safety function.
+
+mod advice;
+mod gap;
+mod lanes;
+mod own;
+mod sight;
+mod site;
+
+use std::collections::BTreeMap;
+
+use crate::ego::geodesy::Geodetic;
+use crate::ego::{Frame, Pose};
+use crate::parameter::{Text, parameters};
+use crate::roadmap::{Origin, Roadmap, Roundabout, roundabouts, simplified};
+use crate::time::Time;
+use crate::track::Object;
+use gap::User;
+use lanes::Belief;
+use own::{Own, standing};
+use sight::Unseen;
+use site::{Placing, Site};
+
+pub use advice::{Advice, ArmAdvice, Hindrance, State, UserOnLane};
+pub use gap::Window;
+pub use lanes::{OnLane, Place};
+pub use sight::Sight;
+
+parameters! {
+    /// Roundabouts: road users on their lanes, and the gap. Advice, and no safety function.
+    pub struct RoundaboutParameters "roundabout" {
+        /// Map of roads with the roundabout: OpenDaVINCI's scenario (.scn, .scnx) or OpenStreetMap
+        /// (.osm). If empty, nothing is said of roundabouts.
+        map: Text = Text::default(), "";
+        /// Where the map's origin lies in a local frame that has no place on the earth, as that of a sensor
+        /// without poses: to the east, or to the right of the sensor's first place.
+        map_x_m: f64 = 0.0, in -100_000.0..=100_000.0, "m";
+        /// The same, to the north, or ahead.
+        map_y_m: f64 = 0.0, in -100_000.0..=100_000.0, "m";
+        /// How far the map's x axis is turned counter-clockwise from that frame's.
+        map_turn_deg: f64 = 0.0, in -180.0..=180.0, "degrees";
+        /// How the vehicle gathers speed when it enters.
+        acceleration_mps2: f64 = 3.0, in 0.3..=8.0, "m/s^2";
+        /// How it brakes before the circle.
+        deceleration_mps2: f64 = 4.5, in 0.5..=10.0, "m/s^2";
+        /// Speed up to which it does. Who is not seen is taken to come as fast.
+        speed_mps: f64 = 8.33, in 1.0..=20.0, "m/s";
+        /// Time that must lie between the vehicle's leaving a conflict point and the next road user's coming.
+        margin_s: f64 = 2.0, in 0.0..=10.0, "s";
+        /// Length of the vehicle.
+        own_length_m: f64 = 4.5, in 0.5..=25.0, "m";
+        /// From the place of its pose ahead to its front.
+        own_front_m: f64 = 2.3, in -5.0..=20.0, "m";
+        /// Distance of the vehicle from the circle's edge within which it counts as being at the roundabout.
+        reach_m: f64 = 60.0, in 5.0..=500.0, "m";
+    }
+}
+
+/// What a revolution brings.
+#[derive(Debug, Clone, Copy)]
+pub struct Situation<'a> {
+    /// End of the sweep.
+    pub time: Time,
+    /// Of all that follows.
+    pub frame: Frame,
+    /// Where that frame lies on the earth.
+    pub reference: Option<Geodetic>,
+    /// The vehicle, if its pose is known.
+    pub vehicle: Option<Pose>,
+    /// Its speed.
+    pub vehicle_speed_mps: f64,
+    /// Road users in the local frame.
+    pub objects: &'a [Object],
+    /// Where the rays went; nothing where all is seen.
+    pub sight: Option<Sight<'a>>,
+}
+
+/// Watches the roundabouts of a map.
+#[derive(Debug, Clone)]
+pub struct Watcher {
+    parameters: RoundaboutParameters,
+    roundabouts: Vec<Roundabout>,
+    origin: Option<Origin>,
+    /// Where they lie in the local frame, and by which placing.
+    sites: Vec<Site>,
+    placing: Option<Placing>,
+    /// The one that is watched, and what is remembered of it.
+    watched: Option<usize>,
+    beliefs: BTreeMap<u32, Belief>,
+    unseen: Unseen,
+    last: Option<Time>,
+    advice: Advice,
+    /// Lanes of each object, reused.
+    lanes: Vec<Vec<OnLane>>,
+}
+
+impl Watcher {
+    /// One that knows no roundabout.
+    pub fn new(parameters: &RoundaboutParameters) -> Self {
+        Self {
+            parameters: parameters.clone(),
+            roundabouts: vec![],
+            origin: None,
+            sites: vec![],
+            placing: None,
+            watched: None,
+            beliefs: BTreeMap::new(),
+            unseen: Unseen::default(),
+            last: None,
+            advice: Advice::default(),
+            lanes: vec![],
+        }
+    }
+
+    /// Takes a map's roundabouts; gives how many there are.
+    pub fn take_map(&mut self, map: &Roadmap) -> usize {
+        let found = roundabouts(map);
+        self.roundabouts = found.iter().map(|one| simplified(one).roundabout).collect();
+        self.origin = map.origin;
+        self.placing = None;
+        self.forget();
+        self.roundabouts.len()
+    }
+
+    /// Forgets who was where.
+    pub fn forget(&mut self) {
+        self.watched = None;
+        self.beliefs.clear();
+        self.unseen = Unseen::default();
+        self.last = None;
+    }
+
+    /// What is to be said of the nearest roundabout; nothing if none is near.
+    pub fn advice(&self) -> Option<&Advice> {
+        self.watched.map(|_| &self.advice)
+    }
+
+    /// Takes in a revolution.
+    pub fn watch(&mut self, situation: &Situation<'_>) {
+        if self.roundabouts.is_empty() {
+            return;
+        }
+        self.place(situation);
+        let Some(index) = self.nearest(situation) else {
+            self.forget();
+            return;
+        };
+        if self.watched != Some(index) {
+            self.forget();
+            self.watched = Some(index);
+        }
+        let site = &self.sites[index];
+        let passed_s = self
+            .last
+            .map_or(0.0, |last| (situation.time - last).seconds());
+        self.last = Some(situation.time);
+        if let Some(sight) = &situation.sight {
+            self.unseen
+                .update(site, sight, passed_s, self.parameters.speed_mps);
+        }
+        self.lanes.resize_with(situation.objects.len(), Vec::new);
+        let mut beliefs = std::mem::take(&mut self.beliefs);
+        for (object, lanes) in situation.objects.iter().zip(&mut self.lanes) {
+            let mut belief = beliefs.remove(&object.id).unwrap_or_default();
+            belief.update(site, object, lanes);
+            self.beliefs.insert(object.id, belief);
+        }
+        self.advise(index, situation);
+    }
+
+    /// The sites, where the local frame lies now.
+    fn place(&mut self, situation: &Situation<'_>) {
+        let placing = Placing {
+            frame: situation.frame,
+            reference: situation.reference,
+            origin: self.origin,
+            shift_m: [self.parameters.map_x_m, self.parameters.map_y_m],
+            turn_rad: self.parameters.map_turn_deg.to_radians(),
+        };
+        if self.placing != Some(placing) {
+            self.placing = Some(placing);
+            let placed = self
+                .roundabouts
+                .iter()
+                .map(|one| Site::placed(one, &placing));
+            self.sites = placed.collect();
+        }
+    }
+
+    fn nearest(&self, situation: &Situation<'_>) -> Option<usize> {
+        let [x, y] = situation
+            .vehicle
+            .map_or([0.0; 2], |pose| [pose.position_m[0], pose.position_m[1]]);
+        let away_m =
+            |site: &Site| libm::hypot(site.centre_m[0] - x, site.centre_m[1] - y) - site.outer_m;
+        let sites = self.sites.iter().enumerate();
+        let nearest = sites.min_by(|(_, a), (_, b)| away_m(a).total_cmp(&away_m(b)));
+        nearest
+            .filter(|(_, site)| away_m(site) < self.parameters.reach_m)
+            .map(|(index, _)| index)
+    }
+
+    fn advise(&mut self, index: usize, situation: &Situation<'_>) {
+        let site = &self.sites[index];
+        let own = Own::of(site, situation, &self.parameters);
+        let mut advice = std::mem::take(&mut self.advice);
+        advice.name.clone_from(&site.name);
+        advice.centre_m = site.centre_m;
+        advice.diameter_m = 2.0 * site.outer_m;
+        advice.state = own.state;
+        advice.own_arm = own.arm;
+        advice.users.clear();
+        advice.windows.clear();
+        advice.arms.clear();
+        let users: Vec<User<'_>> = situation
+            .objects
+            .iter()
+            .zip(&self.lanes)
+            .map(|(object, lanes)| User { object, lanes })
+            .collect();
+        for user in &users {
+            let likeliest = user.lanes.first().filter(|on| on.place != Place::Elsewhere);
+            advice.users.extend(likeliest.map(|&on| UserOnLane {
+                object_id: user.object.id,
+                on,
+            }));
+        }
+        for (number, arm) in site.arms.iter().enumerate() {
+            let is_own = own.arm == Some(number);
+            let lane = if is_own { own.lane } else { 0 };
+            let Some(entry) = arm.entries.get(lane) else {
+                advice.arms.push(ArmAdvice::closed(arm.bearing_rad));
+                continue;
+            };
+            let motion = own
+                .motion
+                .filter(|_| is_own)
+                .unwrap_or_else(|| standing(site, entry, self.parameters.own_length_m));
+            let first = advice.windows.len();
+            for user in &users {
+                gap::windows(site, number, entry, user, &mut advice.windows);
+            }
+            let comers = &advice.windows[first..];
+            let unseen = situation.sight.map(|_| &self.unseen);
+            let arm = ArmAdvice::of(
+                site,
+                arm.bearing_rad,
+                entry,
+                &motion,
+                comers,
+                unseen,
+                &self.parameters,
+            );
+            advice.arms.push(arm);
+        }
+        self.advice = advice;
+    }
+}
