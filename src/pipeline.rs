@@ -357,6 +357,8 @@ impl Pipeline {
                 scan: &self.scan,
                 sensor: &sensor,
                 ground,
+                clusters: self.clusters.clusters(),
+                heights_m: self.ground.heights_m(),
             }),
         };
         self.roundabouts.watch(&situation);

@@ -24,14 +24,17 @@ const MATCH_M: f64 = 2.0;
 pub(super) struct GapScore {
     truth: Watcher,
     arms: Vec<ArmScore>,
+    /// The arm that the vehicle was at first.
+    own_arm: Option<usize>,
     revolutions: usize,
     agreed: usize,
     /// Times that road users were said to come, by true road user and arm: when it was said, and when they
     /// should come.
     expected: ByComer<Vec<f64>>,
     errors_s: Vec<f64>,
-    /// What was said of staying, by true road user and arm: last before the judgement.
-    stays: ByComer<bool>,
+    /// What was said of staying, by true road user and arm, last before the judgement; and when he would truly
+    /// come.
+    stays: ByComer<(bool, f64)>,
     judged: [usize; 2],
     /// Right and all, of cars and of cyclists.
     lanes: [[usize; 2]; 2],
@@ -56,6 +59,7 @@ impl GapScore {
         Self {
             truth,
             arms: vec![],
+            own_arm: None,
             revolutions: 0,
             agreed: 0,
             expected: BTreeMap::new(),
@@ -74,6 +78,7 @@ impl GapScore {
         };
         self.arms
             .resize_with(true_advice.arms.len(), ArmScore::default);
+        self.own_arm = self.own_arm.or(true_advice.own_arm);
         self.revolutions += true_advice.arms.len();
         for ((score, said), known) in self
             .arms
@@ -109,7 +114,7 @@ impl GapScore {
                 let predictions = self.expected.remove(&(user, arm)).unwrap_or_default();
                 self.errors_s
                     .extend(predictions.iter().map(|at_s| (at_s - now_s).abs()));
-                if let Some(stays) = self.stays.remove(&(user, arm)) {
+                if let Some((stays, _)) = self.stays.remove(&(user, arm)) {
                     self.judged[0] += usize::from(stays);
                     self.judged[1] += 1;
                 }
@@ -125,50 +130,46 @@ impl GapScore {
                     .or_default()
                     .push(now_s + expected_s);
             }
-            if true_s >= JUDGED_S {
-                let stays = window.is_some_and(|(_, probability)| *probability >= 0.5);
-                self.stays.insert((user, arm), stays);
+            let stays = self.stays.entry((user, arm)).or_insert((true, 0.0));
+            stays.1 = now_s + true_s;
+        }
+        for (&(user, arm), (stays, comes_s)) in &mut self.stays {
+            if *comes_s - now_s < JUDGED_S {
+                continue;
             }
+            let window = ours.get(&user).and_then(|&object| said.get(&(object, arm)));
+            *stays = window.is_some_and(|(_, probability)| *probability >= 0.5);
         }
         judge_leavers(
             true_advice,
             &mut self.expected,
             &mut self.stays,
+            now_s,
             &mut self.judged,
         );
     }
 
-    /// One line for people, and for scripts.
+    /// Lines for people, and for scripts: of the vehicle's own arm, if it is at one, and of all.
     pub(super) fn summary(&self) -> String {
-        let sum = |count: fn(&ArmScore) -> usize| self.arms.iter().map(count).sum::<usize>();
-        let share = |[right, all]: [usize; 2]| format!("{right} of {all}");
-        let missed = sum(|arm| arm.missed)
-            + self
-                .arms
-                .iter()
-                .filter(|arm| arm.gap == Some(false))
-                .count();
-        let gaps = sum(|arm| arm.gaps);
+        let own = self.own_arm.and_then(|arm| self.arms.get(arm..=arm));
+        let own = own.map(|own| format!("own arm: {}\n", gaps_of(own)));
         let mut errors_s = self.errors_s.clone();
         errors_s.sort_by(f64::total_cmp);
         let quantile = |part: f64| {
             let index = (part * errors_s.len() as f64) as usize;
-            errors_s
-                .get(index.min(errors_s.len().saturating_sub(1)))
-                .copied()
-                .unwrap_or(0.0)
+            let index = index.min(errors_s.len().saturating_sub(1));
+            errors_s.get(index).copied().unwrap_or(0.0)
         };
+        let share = |[right, all]: [usize; 2]| format!("{right} of {all}");
         format!(
-            "gaps at {} arms in {} decisions, of which {} agree with the rule on true road users: \
-             {} announced, {} unsafe, {} by more than {CLEARLY_S} s; {missed} of {gaps} true gaps of \
-             {LONG_GAP_S} s missed; time to the conflict point at 3 s off by {:.2} s median, {:.2} s at \
-             95 % of {}; stay or exit right {}; lane right: cars {}, cyclists {}",
+            "{}all {} arms: {}; {} decisions, of which {} as the rule on true road users; time to the conflict \
+             point at 3 s off by {:.2} s median, {:.2} s at 95 % of {}; stay or exit right {}; lane right: cars {}, \
+             cyclists {}",
+            own.unwrap_or_default(),
             self.arms.len(),
+            gaps_of(&self.arms),
             self.revolutions,
             self.agreed,
-            sum(|arm| arm.announced),
-            sum(|arm| arm.unsafe_goes),
-            sum(|arm| arm.clearly_unsafe),
             quantile(0.5),
             quantile(0.95),
             errors_s.len(),
@@ -177,6 +178,19 @@ impl GapScore {
             share(self.lanes[1]),
         )
     }
+}
+
+/// How gaps were announced at arms.
+fn gaps_of(arms: &[ArmScore]) -> String {
+    let sum = |count: fn(&ArmScore) -> usize| arms.iter().map(count).sum::<usize>();
+    format!(
+        "{} gaps announced, {} unsafe, {} by more than {CLEARLY_S} s; {} of {} true gaps of {LONG_GAP_S} s missed",
+        sum(|arm| arm.announced),
+        sum(|arm| arm.unsafe_goes),
+        sum(|arm| arm.clearly_unsafe),
+        sum(|arm| arm.missed + usize::from(arm.gap == Some(false))),
+        sum(|arm| arm.gaps),
+    )
 }
 
 impl ArmScore {
@@ -209,7 +223,8 @@ type ByComer<T> = BTreeMap<(u32, usize), T>;
 fn judge_leavers(
     known: &Advice,
     expected: &mut ByComer<Vec<f64>>,
-    stays: &mut ByComer<bool>,
+    stays: &mut ByComer<(bool, f64)>,
+    now_s: f64,
     judged: &mut [usize; 2],
 ) {
     for user in known.users.iter().filter(|user| user.on.probability > 0.99) {
@@ -217,8 +232,11 @@ fn judge_leavers(
             continue;
         };
         expected.remove(&(user.object_id, arm));
-        if let Some(stays) = stays.remove(&(user.object_id, arm)) {
-            judged[0] += usize::from(!stays);
+        // He would have come by then: that is when it is judged.
+        let known = stays.get(&(user.object_id, arm)).copied();
+        if let Some((said, _)) = known.filter(|(_, at_s)| at_s - now_s < JUDGED_S) {
+            stays.remove(&(user.object_id, arm));
+            judged[0] += usize::from(!said);
             judged[1] += 1;
         }
     }
@@ -305,8 +323,9 @@ impl TrueState {
             yaw_deviation_rad: 0.0,
             speed_deviation_mps: 0.0,
             existence: 1.0,
-            first_seen: time,
-            seen_since: time,
+            // He was always there.
+            first_seen: Time::from_micros(0),
+            seen_since: Time::from_micros(0),
             last_measured: time,
             points: 0,
         }

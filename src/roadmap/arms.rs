@@ -67,6 +67,9 @@ pub(super) fn accesses(
     (entries, exits)
 }
 
+/// Longest corner: from where a lane meets the circle outward, it has the arm's direction by then.
+const CORNER_M: f64 = 25.0;
+
 pub(super) fn access(lane: &Lane, roundabout: &Roundabout, is_entry: bool) -> Access {
     let whole = lane.curve.polyline();
     let length_m = whole.length_m();
@@ -75,13 +78,24 @@ pub(super) fn access(lane: &Lane, roundabout: &Roundabout, is_entry: bool) -> Ac
     } else {
         whole.between(0.0, REACH_M.min(length_m))
     };
-    let (end_m, _) = way.at(if is_entry { way.length_m() } else { 0.0 });
     let [x, y] = roundabout.centre_m();
+    let angle_rad = |along_m: f64| {
+        let (at_m, _) = way.at(along_m);
+        libm::atan2(at_m[1] - y, at_m[0] - x)
+    };
+    let [mouth_rad, bearing_rad] = [0.0, CORNER_M].map(|away_m| {
+        angle_rad(if is_entry {
+            way.length_m() - away_m
+        } else {
+            away_m
+        })
+    });
     Access {
         lane: lane.id,
         width_m: lane.width_m(),
         kind: lane.kind,
-        mouth_rad: libm::atan2(end_m[1] - y, end_m[0] - x),
+        mouth_rad,
+        bearing_rad,
         way,
     }
 }
@@ -96,12 +110,12 @@ pub(super) fn arms(entries: Vec<Access>, exits: Vec<Access>, is_clockwise: bool)
     };
     let mut mouths: Vec<_> = entries.into_iter().map(|access| (true, access)).collect();
     mouths.extend(exits.into_iter().map(|access| (false, access)));
-    mouths.sort_by(|(_, a), (_, b)| round_rad(a.mouth_rad).total_cmp(&round_rad(b.mouth_rad)));
+    mouths.sort_by(|(_, a), (_, b)| round_rad(a.bearing_rad).total_cmp(&round_rad(b.bearing_rad)));
     // Begin behind the widest gap.
     let count = mouths.len();
     let gap_before = |index: usize| {
         let before = &mouths[(index + count - 1) % count].1;
-        let step_rad = round_rad(mouths[index].1.mouth_rad - before.mouth_rad);
+        let step_rad = round_rad(mouths[index].1.bearing_rad - before.bearing_rad);
         if count == 1 { TAU } else { step_rad }
     };
     let widest = (0..count).max_by(|&a, &b| gap_before(a).total_cmp(&gap_before(b)));
@@ -109,8 +123,8 @@ pub(super) fn arms(entries: Vec<Access>, exits: Vec<Access>, is_clockwise: bool)
     let mut found: Vec<Arm> = vec![];
     let mut last_rad = 0.0;
     for (is_entry, access) in mouths {
-        let step_rad = round_rad(access.mouth_rad - last_rad);
-        last_rad = access.mouth_rad;
+        let step_rad = round_rad(access.bearing_rad - last_rad);
+        last_rad = access.bearing_rad;
         let joins = found.last().is_some_and(|arm| {
             step_rad < ARM_RAD && (is_entry || (arm.entries.is_empty() && step_rad < ARM_RAD / 2.0))
         });
@@ -129,7 +143,7 @@ pub(super) fn arms(entries: Vec<Access>, exits: Vec<Access>, is_clockwise: bool)
     for arm in &mut found {
         let mouths = arm.entries.iter().chain(&arm.exits);
         let [x, y] = mouths.fold([0.0; 2], |[x, y], access| {
-            let (sine, cosine) = libm::sincos(access.mouth_rad);
+            let (sine, cosine) = libm::sincos(access.bearing_rad);
             [x + cosine, y + sine]
         });
         arm.bearing_rad = libm::atan2(y, x);

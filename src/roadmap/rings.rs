@@ -16,6 +16,8 @@ const RADII_M: std::ops::RangeInclusive<f64> = 3.0..=60.0;
 /// Points of a lane that belong to one circle are within this of it. Maps are drawn by hand, to
 /// tenths of a metre, and OpenStreetMap's circles are polygons.
 pub(super) const OFF_CIRCLE_M: f64 = 0.6;
+/// The same of a corner, which is shorter and meets straight lines.
+const OFF_CORNER_M: f64 = 0.1;
 /// Least sweep of a piece of a lane that tells a circle.
 const LEAST_SWEEP_RAD: f64 = PI / 4.0;
 /// Pieces of one circle have their middles within this of each other.
@@ -234,7 +236,7 @@ fn trimmed(
 /// The longest first.
 fn bends_of(network: &Network<'_>, lanes: impl Iterator<Item = usize>) -> Vec<Bend> {
     let mut found: Vec<_> = lanes
-        .flat_map(|lane| bends(lane, &network.ways[lane]))
+        .flat_map(|lane| bends(lane, &network.ways[lane], OFF_CIRCLE_M))
         .collect();
     found.sort_by(|a, b| b.sweep_rad.abs().total_cmp(&a.sweep_rad.abs()));
     found
@@ -276,12 +278,12 @@ fn is_closed(network: &Network<'_>, lanes: &BTreeSet<usize>) -> bool {
 }
 
 /// Pieces of a way that run on circles, one after the other, each as long as it goes.
-fn bends(lane: usize, way: &Polyline) -> Vec<Bend> {
+fn bends(lane: usize, way: &Polyline, off_m: f64) -> Vec<Bend> {
     let points_m = thinned(way);
     let mut found = vec![];
     let mut start = 0;
     while start + 3 < points_m.len() {
-        let Some((end, circle)) = longest(&points_m, start) else {
+        let Some((end, circle)) = longest(&points_m, start, off_m) else {
             start += 1;
             continue;
         };
@@ -319,7 +321,7 @@ fn thinned(way: &Polyline) -> Vec<[f64; 2]> {
 }
 
 /// The longest piece from a point on that lies on one circle, up to once round.
-fn longest(points_m: &[[f64; 2]], start: usize) -> Option<(usize, Circle)> {
+fn longest(points_m: &[[f64; 2]], start: usize, off_m: f64) -> Option<(usize, Circle)> {
     /// A shorter piece of a drawn line has any radius.
     const LEAST_WAY_M: f64 = 6.0;
     let mut way_m = 0.0;
@@ -332,9 +334,7 @@ fn longest(points_m: &[[f64; 2]], start: usize) -> Option<(usize, Circle)> {
         let piece = &points_m[start..=end];
         let fits = Circle::fit(piece).filter(|circle| {
             RADII_M.contains(&circle.radius_m)
-                && piece
-                    .iter()
-                    .all(|&at_m| circle.off_m(at_m).abs() < OFF_CIRCLE_M)
+                && piece.iter().all(|&at_m| circle.off_m(at_m).abs() < off_m)
                 && way_m < TAU * circle.radius_m + 1.0
         });
         let Some(circle) = fits else { break };
@@ -352,7 +352,7 @@ fn sweep_rad(circle: &Circle, points_m: &[[f64; 2]]) -> f64 {
 
 /// Bends to the right or left of a way, as circles with their sweep.
 pub(super) fn circles_of(way: &Polyline) -> impl Iterator<Item = (Circle, f64)> {
-    bends(0, way)
+    bends(0, way, OFF_CORNER_M)
         .into_iter()
         .map(|bend| (bend.circle, bend.sweep_rad))
 }

@@ -68,6 +68,8 @@ pub struct Access {
     pub kind: LaneKind,
     /// Where it meets the circle: direction from the middle, counter-clockwise from east.
     pub mouth_rad: f64,
+    /// Direction from the middle to where the corner begins.
+    pub bearing_rad: f64,
 }
 
 /// Where a road meets the circle.

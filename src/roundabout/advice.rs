@@ -5,7 +5,6 @@ use super::lanes::OnLane;
 use super::sight::Unseen;
 use super::site::{Entry, Site};
 use super::{RoundaboutParameters, Window};
-use crate::roadmap::LaneKind;
 
 /// How far the vehicle has come (thesis: start, to the roundabout, brake, in the roundabout,
 /// exit).
@@ -167,12 +166,9 @@ impl ArmAdvice {
                     }
                 }
             }
-            if let Some(unseen) = unseen
-                && conflict.kind == LaneKind::Road
-            {
-                let (away_m, seen_share) = unseen.before(site, conflict.angle_rad);
-                advice.seen_share = seen_share;
-                let comes_s = away_m.map_or(f64::INFINITY, |away_m| away_m / parameters.speed_mps);
+            if let Some(unseen) = unseen {
+                let (comes_s, seen_share) = unseen.before(site, conflict, parameters.speed_mps);
+                advice.seen_share = advice.seen_share.min(seen_share);
                 if comes_s - end_s < parameters.margin_s && advice.hindrance.is_none() {
                     advice.hindrance = Some(Hindrance::Unseen);
                 }

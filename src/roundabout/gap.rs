@@ -3,9 +3,11 @@
 use std::f64::consts::TAU;
 
 use super::RoundaboutParameters;
-use super::lanes::{OnLane, Place};
+use super::lanes::{OnLane, Place, STAYS};
+use super::sight::fastest_mps;
 use super::site::{Conflict, Entry, Site};
 use crate::roadmap::LaneKind;
+use crate::time::Time;
 use crate::track::Object;
 
 /// When a road user is at a conflict point.
@@ -48,16 +50,26 @@ pub(super) struct User<'a> {
 /// Windows farther off than this are not told.
 pub(super) const HORIZON_S: f64 = 15.0;
 /// Who comes with less than this probability is not waited for.
-pub(super) const LEAST_PROBABILITY: f64 = 0.1;
+const LEAST_PROBABILITY: f64 = 0.03;
 /// Slower road users do not come: they wait.
-const WAITS_MPS: f64 = 0.5;
+const WAITS_MPS: f64 = 0.7;
+/// Who goes along a pavement with less than this share of his speed goes across it.
+const ALONG_SHARE: f64 = 0.7;
+/// Who was first seen so lately may be faster than he seems, and go another way.
+const NEW_S: f64 = 2.0;
 /// Time that a road user must have been gone before the vehicle comes.
 pub(super) const BEHIND_S: f64 = 0.3;
 /// Standard deviations that a window is widened by at either end.
-const DEVIATIONS: f64 = 2.0;
-/// Probability that one who is on the circle stays there at an exit that he is not seen to take:
-/// unknown.
-const STAYS: f64 = 0.6;
+const DEVIATIONS: f64 = 0.3;
+/// The same of somebody who is hidden.
+const DEVIATIONS_HIDDEN: f64 = 1.0;
+/// The same of its end: it costs little to let him pass.
+const DEVIATIONS_BEHIND: f64 = 1.0;
+/// Slower ones on the circle may gather speed, and so fast.
+const SLOW_MPS: f64 = 2.0;
+const STARTS_MPS2: f64 = 3.0;
+/// More does not count: whose place is not known at all is rather not there.
+const MOST_BLUR_M: f64 = 2.0;
 
 impl OwnMotion {
     /// When the front has gone so far, by the stated acceleration up to the stated speed.
@@ -100,17 +112,36 @@ pub(super) fn windows(
     arm: usize,
     entry: &Entry,
     user: &User<'_>,
+    now: Time,
+    road_mps: f64,
     found: &mut Vec<Window>,
 ) {
     for (number, conflict) in entry.conflicts.iter().enumerate() {
-        let zone_m = entry.width_m / 2.0;
         let ways = user.lanes.iter().filter_map(|on| {
-            let (way_m, probability) = way_to(site, arm, conflict, on)?;
-            Some((way_m, on.speed_mps.abs(), probability * on.probability))
+            // Who crosses a pavement may go either way along it.
+            let speed_mps = user.object.speed_mps.abs();
+            let is_across =
+                conflict.kind == LaneKind::Pavement && on.speed_mps.abs() < ALONG_SHARE * speed_mps;
+            let (way_m, probability) = way_to(site, arm, conflict, on, is_across)?;
+            let speeds_mps = if is_across {
+                [speed_mps; 2]
+            } else {
+                [on.speed_mps.abs(), on.mean_speed_mps.abs()]
+            };
+            let on_circle = matches!(on.place, Place::Ring(_)) && conflict.kind == LaneKind::Road;
+            Some((way_m, speeds_mps, on_circle, probability * on.probability))
         });
         let mut best: Option<Window> = None;
-        for (way_m, speed_mps, probability) in ways {
-            let Some(window) = window(user.object, way_m, speed_mps, zone_m) else {
+        for (way_m, speeds_mps, on_circle, probability) in ways {
+            let approach = Approach {
+                way_m,
+                speeds_mps,
+                zone_m: entry.width_m / 2.0,
+                fastest_mps: fastest_mps(conflict.kind, road_mps),
+                on_circle,
+                is_new: (now - user.object.first_seen).seconds() < NEW_S,
+            };
+            let Some(window) = window(user.object, &approach) else {
                 continue;
             };
             let window = Window {
@@ -141,7 +172,13 @@ pub(super) fn windows(
 
 /// How far it is for the middle of somebody on a lane to a conflict point, negative behind it, and
 /// how probably the way leads there.
-fn way_to(site: &Site, arm: usize, conflict: &Conflict, on: &OnLane) -> Option<(f64, f64)> {
+fn way_to(
+    site: &Site,
+    arm: usize,
+    conflict: &Conflict,
+    on: &OnLane,
+    either_way: bool,
+) -> Option<(f64, f64)> {
     let ring = &site.rings[conflict.ring];
     let radius_m = ring.circle.radius_m;
     // Behind the point by less than this is behind it, and not almost all the way round.
@@ -165,7 +202,11 @@ fn way_to(site: &Site, arm: usize, conflict: &Conflict, on: &OnLane) -> Option<(
             } else {
                 site.round_rad(angle_rad, conflict.angle_rad)
             };
-            let way_m = behind(own.circle.radius_m * round_rad);
+            let way_m = if either_way {
+                own.circle.radius_m * round_rad.min(TAU - round_rad)
+            } else {
+                behind(own.circle.radius_m * round_rad)
+            };
             let exits = if own.kind == LaneKind::Road && way_m > 0.0 {
                 exits_between(site, angle_rad, round_rad)
             } else {
@@ -192,13 +233,36 @@ fn exits_between(site: &Site, angle_rad: f64, round_rad: f64) -> i32 {
     ahead.count() as i32
 }
 
-/// The window of somebody who has so far to go to a conflict point that reaches so far along the way.
-fn window(object: &Object, way_m: f64, speed_mps: f64, zone_m: f64) -> Option<Window> {
+/// How somebody comes to a conflict point.
+struct Approach {
+    /// Left for his middle; negative behind the point.
+    way_m: f64,
+    /// Along it: now, and in the mean of the last moments.
+    speeds_mps: [f64; 2],
+    /// How far the conflict reaches along it, to either side.
+    zone_m: f64,
+    /// As fast as anybody comes there.
+    fastest_mps: f64,
+    /// Whether he is on the circle already.
+    on_circle: bool,
+    /// Whether he has only just been seen.
+    is_new: bool,
+}
+
+/// The window of somebody who comes so.
+fn window(object: &Object, approach: &Approach) -> Option<Window> {
+    let &Approach {
+        way_m,
+        speeds_mps: [now_mps, mean_mps],
+        zone_m,
+        fastest_mps,
+        on_circle,
+        is_new,
+    } = approach;
     let [x, y] = object.position_deviation_m;
-    let blur_m = DEVIATIONS * x.max(y).min(2.0);
     let half_m = object.length_m / 2.0 + zone_m;
     let (front_m, rear_m) = (way_m - half_m, way_m + half_m);
-    let blur_mps = DEVIATIONS * object.speed_deviation_mps;
+    let [slow_mps, fast_mps] = [now_mps.min(mean_mps), now_mps.max(mean_mps)];
     let blank = Window {
         object_id: object.id,
         arm: 0,
@@ -210,19 +274,44 @@ fn window(object: &Object, way_m: f64, speed_mps: f64, zone_m: f64) -> Option<Wi
         probability: 0.0,
         way_m,
     };
-    if speed_mps < WAITS_MPS {
+    if fast_mps + 2.0 * object.speed_deviation_mps < WAITS_MPS && !is_new {
         // Who stands where the ways cross is in the way as long as he stands.
         let is_there = front_m <= 0.0 && rear_m >= 0.0;
         let end_s = HORIZON_S;
         return is_there.then_some(Window { end_s, ..blank });
     }
-    let (slow_mps, fast_mps) = ((speed_mps - blur_mps).max(WAITS_MPS), speed_mps + blur_mps);
-    let begin_s = ((front_m - blur_m) / fast_mps).max(0.0);
-    let end_s = ((rear_m + blur_m) / slow_mps).max((rear_m + blur_m) / fast_mps);
+    // How far off the time is by then: it is not known where he is, and not how fast.
+    let at_s = |way_m: f64, speed_mps: f64, side: f64| {
+        let moving_mps = speed_mps.max(WAITS_MPS);
+        let wander_m = way_m.max(0.0) / moving_mps * object.speed_deviation_mps;
+        let blur_m = libm::hypot(x.max(y).min(MOST_BLUR_M), wander_m);
+        (way_m + side * blur_m) / moving_mps
+    };
+    let deviations = if object.measured {
+        DEVIATIONS
+    } else {
+        DEVIATIONS_HIDDEN
+    };
+    let begin_s = at_s(front_m, fast_mps, -deviations).max(0.0);
+    // Who stands on the circle may go on.
+    let starts_s = libm::sqrt(2.0 * front_m.max(0.0) / STARTS_MPS2);
+    let begin_s = if on_circle && fast_mps < SLOW_MPS {
+        begin_s.min(starts_s)
+    } else {
+        begin_s
+    };
+    // Nobody knows yet how fast he is, or which way he goes.
+    let begin_s = if is_new {
+        begin_s.min(front_m.max(0.0) / fastest_mps)
+    } else {
+        begin_s
+    };
+    let end_s = at_s(rear_m, slow_mps, DEVIATIONS_BEHIND);
+    let expected_s = at_s(way_m - object.length_m / 2.0, now_mps, 0.0).max(0.0);
     (end_s > 0.0).then_some(Window {
         begin_s,
         end_s,
-        expected_s: ((way_m - object.length_m / 2.0) / speed_mps).max(0.0),
+        expected_s,
         ..blank
     })
 }

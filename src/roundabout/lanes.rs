@@ -31,12 +31,16 @@ pub struct OnLane {
     pub offset_m: f64,
     /// Along it positive: speed as far as it leads along the lane.
     pub speed_mps: f64,
+    /// The same in the mean of the last moments.
+    pub mean_speed_mps: f64,
 }
 
 /// What the filter remembers of a road user: lanes with their probabilities.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Belief {
     lanes: Vec<(Place, f64)>,
+    /// In the mean of the last moments, if he was seen before.
+    mean_speed_mps: Option<f64>,
 }
 
 /// Lanes less probable than this are not told.
@@ -52,12 +56,21 @@ const HEADING_RAD: f64 = 0.2;
 const YAW_RATE_RADPS: f64 = 0.2;
 /// Slower ones have no heading that says anything.
 const MOVING_MPS: f64 = 0.7;
+/// Share of road users who move as none of the lanes lead: they change lanes, or turn round.
+const OTHERWISE: f64 = 0.05;
+/// Weight of a revolution in the mean speed: the last 0.7 s of ten a second.
+const MEAN_SHARE: f64 = 0.14;
+/// Cosine of the direction against a lane within which somebody goes along it.
+const LEADS: f64 = 0.3;
+/// Probability that one who is on the circle stays there at an exit that he is not seen to take:
+/// unknown.
+pub(super) const STAYS: f64 = 0.6;
+/// So far into an exit one may have come from the circle.
+const MOUTH_M: f64 = 6.0;
 /// Density of road users beside all lanes, in place of a lane's by place and heading.
 const ELSEWHERE: f64 = 0.02;
-/// Longest time that a belief is kept of somebody who is not listed, in revolutions, is none:
-/// identities are the tracker's.
+/// Share of those met near a roundabout on roads, bikeways and pavements.
 const CLASSES: [(Class, [f64; 3]); 4] = [
-    // Share of those met near a roundabout on roads, bikeways and pavements.
     (Class::Car, [0.98, 0.01, 0.01]),
     (Class::LargeVehicle, [0.98, 0.01, 0.01]),
     (Class::Cyclist, [0.27, 0.70, 0.03]),
@@ -88,6 +101,7 @@ impl Belief {
                 along_m: 0.0,
                 offset_m: 0.0,
                 speed_mps: object.speed_mps,
+                mean_speed_mps: object.speed_mps,
             },
             likelihood: ELSEWHERE,
         }];
@@ -107,20 +121,18 @@ impl Belief {
                     .filter_map(|(place, (way, width_m))| on_way(place, way, width_m, object)),
             );
         }
-        // Nobody knows where somebody is who was never seen.
-        let fresh = 1.0 / candidates.len() as f64;
-        let prior = |place: Place| {
-            let known = self.lanes.iter().find(|(other, _)| *other == place);
-            let kept = known.map_or(0.0, |(_, probability)| *probability);
-            if self.lanes.is_empty() {
-                fresh
-            } else {
-                (1.0 - FORGOTTEN) * kept + FORGOTTEN * fresh
-            }
+        let (_, speed_mps) = course(object);
+        let mean_mps = self.mean_speed_mps.unwrap_or(speed_mps);
+        let mean_mps = mean_mps + MEAN_SHARE * (speed_mps - mean_mps);
+        self.mean_speed_mps = Some(mean_mps);
+        let steadied = if speed_mps > 0.0 {
+            mean_mps / speed_mps
+        } else {
+            1.0
         };
         let weights: Vec<f64> = candidates
             .iter()
-            .map(|candidate| candidate.likelihood * prior(candidate.on.place))
+            .map(|candidate| candidate.likelihood * self.prior(&candidate.on, candidates.len()))
             .collect();
         let sum: f64 = weights.iter().sum();
         self.lanes.clear();
@@ -131,11 +143,34 @@ impl Belief {
             if probability >= LEAST_PROBABILITY {
                 found.push(OnLane {
                     probability,
+                    mean_speed_mps: steadied * candidate.on.speed_mps,
                     ..candidate.on
                 });
             }
         }
         found.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    }
+
+    /// How probable a lane is before it is known where somebody is now.
+    fn prior(&self, on: &OnLane, lanes: usize) -> f64 {
+        let fresh = 1.0 / lanes as f64;
+        // Nobody knows where somebody was who was never seen.
+        if self.lanes.is_empty() {
+            return fresh;
+        }
+        let known = self.lanes.iter().find(|(other, _)| *other == on.place);
+        let kept = known.map_or(0.0, |(_, probability)| *probability);
+        let stayed = (1.0 - FORGOTTEN) * kept + FORGOTTEN * fresh;
+        let is_mouth = matches!(on.place, Place::Exit(..)) && on.along_m < MOUTH_M;
+        if !is_mouth {
+            return stayed;
+        }
+        let rings = self
+            .lanes
+            .iter()
+            .filter(|(place, _)| matches!(place, Place::Ring(_)));
+        let round: f64 = rings.map(|(_, probability)| probability).sum();
+        stayed.max((1.0 - STAYS) * round)
     }
 }
 
@@ -164,7 +199,9 @@ fn motion_fit(object: &Object, heading_rad: f64, curvature_per_m: f64) -> f64 {
     let heading_deviation_rad = libm::hypot(HEADING_RAD, object.yaw_deviation_rad);
     let off_rad = wrapped_rad(course_rad - heading_rad);
     let off_radps = object.yaw_rate_radps - speed_mps * curvature_per_m;
-    gauss(off_rad, heading_deviation_rad) * gauss(off_radps, YAW_RATE_RADPS + 0.05 * speed_mps)
+    let fits =
+        gauss(off_rad, heading_deviation_rad) * gauss(off_radps, YAW_RATE_RADPS + 0.05 * speed_mps);
+    (1.0 - OTHERWISE) * fits + OTHERWISE
 }
 
 fn place_fit(object: &Object, offset_m: f64, width_m: f64) -> f64 {
@@ -194,7 +231,13 @@ fn on_ring(site: &Site, index: usize, object: &Object) -> Option<Candidate> {
     };
     let (course_rad, speed_mps) = course(object);
     let heading_rad = if is_along { tangent_rad } else { back_rad };
-    let leads_mps = speed_mps * libm::cos(course_rad - heading_rad);
+    let leads = libm::cos(course_rad - heading_rad);
+    // Who changes lanes goes round as fast as he goes.
+    let leads_mps = if ring.kind == LaneKind::Road && leads > LEADS {
+        speed_mps
+    } else {
+        speed_mps * leads
+    };
     Some(Candidate {
         on: OnLane {
             place: Place::Ring(index),
@@ -202,6 +245,7 @@ fn on_ring(site: &Site, index: usize, object: &Object) -> Option<Candidate> {
             along_m: ring.circle.radius_m * angle_rad,
             offset_m,
             speed_mps: if is_along { leads_mps } else { -leads_mps },
+            mean_speed_mps: 0.0,
         },
         likelihood: place_fit(object, offset_m, ring.width_m)
             * fit
@@ -230,6 +274,7 @@ fn on_way(
             along_m: station.along_m,
             offset_m: station.offset_m,
             speed_mps: speed_mps * libm::cos(course_rad - station.heading_rad),
+            mean_speed_mps: 0.0,
         },
         likelihood: place_fit(object, station.offset_m, width_m)
             * fit

@@ -79,6 +79,9 @@ pub struct Situation<'a> {
     pub sight: Option<Sight<'a>>,
 }
 
+/// Who has only begun to watch has not seen everybody yet.
+const FIRST_LOOK_S: f64 = 1.5;
+
 /// Watches the roundabouts of a map.
 #[derive(Debug, Clone)]
 pub struct Watcher {
@@ -93,6 +96,7 @@ pub struct Watcher {
     beliefs: BTreeMap<u32, Belief>,
     unseen: Unseen,
     last: Option<Time>,
+    since: Option<Time>,
     advice: Advice,
     /// Lanes of each object, reused.
     lanes: Vec<Vec<OnLane>>,
@@ -111,6 +115,7 @@ impl Watcher {
             beliefs: BTreeMap::new(),
             unseen: Unseen::default(),
             last: None,
+            since: None,
             advice: Advice::default(),
             lanes: vec![],
         }
@@ -132,6 +137,7 @@ impl Watcher {
         self.beliefs.clear();
         self.unseen = Unseen::default();
         self.last = None;
+        self.since = None;
     }
 
     /// What is to be said of the nearest roundabout; nothing if none is near.
@@ -158,9 +164,11 @@ impl Watcher {
             .last
             .map_or(0.0, |last| (situation.time - last).seconds());
         self.last = Some(situation.time);
+        self.since.get_or_insert(situation.time);
         if let Some(sight) = &situation.sight {
+            let road_mps = self.parameters.speed_mps;
             self.unseen
-                .update(site, sight, passed_s, self.parameters.speed_mps);
+                .update(site, sight, situation.objects, passed_s, road_mps);
         }
         self.lanes.resize_with(situation.objects.len(), Vec::new);
         let mut beliefs = std::mem::take(&mut self.beliefs);
@@ -229,6 +237,10 @@ impl Watcher {
                 on,
             }));
         }
+        let watched_s = self
+            .since
+            .map_or(0.0, |since| (situation.time - since).seconds());
+        let is_fresh = watched_s < FIRST_LOOK_S;
         for (number, arm) in site.arms.iter().enumerate() {
             let is_own = own.arm == Some(number);
             let lane = if is_own { own.lane } else { 0 };
@@ -242,11 +254,20 @@ impl Watcher {
                 .unwrap_or_else(|| standing(site, entry, self.parameters.own_length_m));
             let first = advice.windows.len();
             for user in &users {
-                gap::windows(site, number, entry, user, &mut advice.windows);
+                let road_mps = self.parameters.speed_mps;
+                gap::windows(
+                    site,
+                    number,
+                    entry,
+                    user,
+                    situation.time,
+                    road_mps,
+                    &mut advice.windows,
+                );
             }
             let comers = &advice.windows[first..];
             let unseen = situation.sight.map(|_| &self.unseen);
-            let arm = ArmAdvice::of(
+            let mut arm = ArmAdvice::of(
                 site,
                 arm.bearing_rad,
                 entry,
@@ -255,6 +276,10 @@ impl Watcher {
                 unseen,
                 &self.parameters,
             );
+            if is_fresh && situation.sight.is_some() {
+                arm.may_enter = false;
+                arm.hindrance = arm.hindrance.or(Some(Hindrance::Unseen));
+            }
             advice.arms.push(arm);
         }
         self.advice = advice;

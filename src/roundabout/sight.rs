@@ -4,11 +4,13 @@ use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 
-use super::site::Site;
+use super::site::{Conflict, Site};
 use crate::cloud::{MAX_LAYERS, Scan};
+use crate::cluster::Clusters;
 use crate::geometry::Rigid;
 use crate::ground::Plane;
 use crate::roadmap::LaneKind;
+use crate::track::Object;
 
 /// Where the last revolution's rays went.
 #[derive(Debug, Clone, Copy)]
@@ -19,6 +21,10 @@ pub struct Sight<'a> {
     pub sensor: &'a Rigid,
     /// The ground in the sensor frame.
     pub ground: &'a Plane,
+    /// Which points belong together.
+    pub clusters: &'a Clusters,
+    /// Heights of the points above the ground.
+    pub heights_m: &'a [f32],
 }
 
 /// Height above the ground at which a road user is looked for: the bonnet of a car, the wheels of
@@ -30,46 +36,78 @@ const SHORT_M: f64 = 1.0;
 const SHORT_SHARE: f64 = 0.05;
 
 impl Sight<'_> {
+    /// Places of the local frame where something is: a few points of every cluster, at the height of road users.
+    fn things_m(&self) -> impl Iterator<Item = [f64; 2]> {
+        /// Of each cluster, whose points are in the order of their columns.
+        const POINTS: usize = 5;
+        const HEIGHTS_M: std::ops::Range<f32> = 0.3..2.5;
+        let sampled = self.clusters.iter().flat_map(|points| {
+            let every = (points.len() / POINTS).max(1);
+            points.iter().skip(every / 2).step_by(every)
+        });
+        let sampled = sampled.map(|&point| point as usize);
+        let high = sampled.filter(|&point| HEIGHTS_M.contains(&self.heights_m[point]));
+        high.map(|point| {
+            let place = self
+                .sensor
+                .place(&self.scan.point_m(point).map(f64::from).into());
+            [place.x, place.y]
+        })
+    }
+
     /// Whether a ray reached a place of the local frame, a little above the ground.
-    pub(super) fn reaches(&self, [x, y]: [f64; 2]) -> bool {
+    fn reaches(&self, [x, y]: [f64; 2]) -> bool {
         let level = Vector3::new(x, y, self.sensor.translation_m.z);
         let from = self.sensor.rotation.transpose() * (level - self.sensor.translation_m);
         let out_m = libm::hypot(from.x, from.y);
         if out_m < 1.0 {
             return true;
         }
-        let below_m =
-            self.ground.above_m(&Vector3::new(from.x, from.y, 0.0)) / self.ground.normal()[2];
-        let z_m = LOOK_M - below_m;
-        let tangent = z_m / out_m;
+        let plane = self.ground;
+        let below_m = plane.above_m(&Vector3::new(from.x, from.y, 0.0)) / plane.normal()[2];
+        let tangent = (LOOK_M - below_m) / out_m;
         let column = self.scan.column_at(libm::atan2(from.x, from.y));
         let layers = self.scan.sensor().elevation_deg.len();
-        let above = (0..layers)
-            .find(|&layer| self.scan.slope(layer).0 > tangent)
-            .unwrap_or(layers);
+        let above = (0..layers).find(|&layer| self.scan.slope(layer).0 > tangent);
+        let above = above.unwrap_or(layers);
         let azimuths = self.scan.azimuths();
-        let reaches = |layer: usize| {
-            [-1, 0, 1].into_iter().any(|after| {
-                let column = azimuths.column_beside(column, after).unwrap_or(column);
-                let point = column * MAX_LAYERS + layer;
-                let reached_m = f64::from(self.scan.reached_m()[point]);
-                reached_m == 0.0 || reached_m > out_m * (1.0 - SHORT_SHARE) - SHORT_M
-            })
-        };
-        [above.wrapping_sub(1), above]
+        let near_m = out_m * (1.0 - SHORT_SHARE) - SHORT_M;
+        let seen = [above.wrapping_sub(1), above]
             .into_iter()
-            .filter(|&layer| layer < layers)
-            .any(reaches)
+            .filter(|&layer| layer < layers);
+        let reached = |layer: usize, after: isize| {
+            let column = azimuths.column_beside(column, after).unwrap_or(column);
+            let reached_m = self.scan.reached_m()[column * MAX_LAYERS + layer];
+            reached_m == 0.0 || f64::from(reached_m) > near_m
+        };
+        // Two of three rays side by side.
+        let mut seen = seen.map(|layer| [-1, 0, 1].map(|after| reached(layer, after)));
+        seen.any(|rays| rays.into_iter().filter(|&reached| reached).count() >= 2)
     }
 }
+
+/// Who is listed within this of a place is who is there.
+const LISTED_M: f64 = 3.5;
+/// What is on a ring is within this share of its width: beside it kerbs, signs and bushes begin.
+const ON_RING: f64 = 0.8;
+/// Nobody on a cycle path or on foot comes faster out of where nothing is seen.
+const CYCLIST_MPS: f64 = 6.0;
+const WALKER_MPS: f64 = 2.0;
 
 /// Places on the circle, as far apart as this.
 const APART_M: f64 = 2.0;
 
-/// Where on the road round the circle somebody may be whom nobody has seen: what is hidden now and
-/// was not seen to be empty before, or was reached from there meanwhile.
+/// Where on the rings somebody may be who is not listed: what is hidden now and was not seen to be
+/// free before, what was reached from there meanwhile, where a listed road user was hidden and
+/// is not listed any more, and where something is that is not listed.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Unseen {
+    rings: Vec<Stretch>,
+}
+
+/// Of one ring.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Stretch {
     /// From east on, in the direction of driving.
     may_hold: Vec<bool>,
     /// How far they may have gone since the last step.
@@ -77,43 +115,98 @@ pub(super) struct Unseen {
 }
 
 impl Unseen {
-    /// Takes in what is seen `passed_s` later; hidden road users go no faster than `speed_mps`.
-    pub(super) fn update(&mut self, site: &Site, sight: &Sight<'_>, passed_s: f64, speed_mps: f64) {
-        let Some(road) = site.outermost_road() else {
-            return;
-        };
-        let circle = site.rings[road].circle;
-        let count = libm::ceil(TAU * circle.radius_m / APART_M).clamp(8.0, 400.0) as usize;
-        if self.may_hold.len() != count {
-            self.may_hold = vec![true; count];
-        }
-        self.gone_m += passed_s.clamp(0.0, 10.0) * speed_mps;
-        while self.gone_m >= APART_M {
-            self.gone_m -= APART_M;
-            let last = self.may_hold[count - 1];
-            for place in (1..count).rev() {
-                self.may_hold[place] |= self.may_hold[place - 1];
+    /// Takes in what is seen `passed_s` later.
+    pub(super) fn update(
+        &mut self,
+        site: &Site,
+        sight: &Sight<'_>,
+        objects: &[Object],
+        passed_s: f64,
+        road_mps: f64,
+    ) {
+        self.rings.resize_with(site.rings.len(), Stretch::default);
+        for (ring, stretch) in site.rings.iter().zip(&mut self.rings) {
+            let count = libm::ceil(TAU * ring.circle.radius_m / APART_M).clamp(8.0, 400.0) as usize;
+            if stretch.may_hold.len() != count {
+                stretch.may_hold = vec![true; count];
             }
-            self.may_hold[0] |= last;
+            stretch.gone_m += passed_s.clamp(0.0, 10.0) * fastest_mps(ring.kind, road_mps);
+            while stretch.gone_m >= APART_M {
+                stretch.gone_m -= APART_M;
+                stretch.spread(ring.kind == LaneKind::Pavement);
+            }
+            for place in 0..count {
+                let at_m = ring.circle.at(angle_rad(site, place, count));
+                if sight.reaches(at_m) {
+                    stretch.may_hold[place] = false;
+                } else {
+                    // Should he not be listed any more, he is still there.
+                    stretch.may_hold[place] |= is_listed(objects, at_m);
+                }
+            }
         }
-        for place in 0..count {
-            if self.may_hold[place] && sight.reaches(circle.at(angle_rad(site, place, count))) {
-                self.may_hold[place] = false;
+        for at_m in sight.things_m() {
+            for (ring, stretch) in site.rings.iter().zip(&mut self.rings) {
+                let count = stretch.may_hold.len();
+                let is_on = ring.circle.off_m(at_m).abs() < ON_RING * ring.width_m / 2.0;
+                if is_on && !is_listed(objects, at_m) {
+                    let round_rad = site.round_rad(0.0, ring.circle.angle_rad(at_m));
+                    let place = (round_rad / TAU * count as f64) as usize;
+                    stretch.may_hold[place.min(count - 1)] = true;
+                }
             }
         }
     }
 
-    /// How far before a direction the nearest place lies from which somebody may come, if there is one, going back
-    /// round the circle; and the share of the circle that holds nobody unseen.
-    pub(super) fn before(&self, site: &Site, conflict_rad: f64) -> (Option<f64>, f64) {
-        let count = self.may_hold.len();
-        let roads = site.rings.iter().filter(|ring| ring.kind == LaneKind::Road);
-        let radius_m = roads.map(|ring| ring.circle.radius_m).fold(0.0, f64::max);
-        let hidden = (0..count).filter(|&place| self.may_hold[place]);
-        let away_m =
-            |place: usize| radius_m * site.round_rad(angle_rad(site, place, count), conflict_rad);
-        let nearest_m = hidden.clone().map(away_m).min_by(f64::total_cmp);
-        (nearest_m, 1.0 - hidden.count() as f64 / count.max(1) as f64)
+    /// How long it takes from the nearest place where somebody may be who is not listed to a conflict point, if
+    /// there is one; and the share of the ring where nobody is.
+    pub(super) fn before(&self, site: &Site, conflict: &Conflict, road_mps: f64) -> (f64, f64) {
+        let ring = &site.rings[conflict.ring];
+        let Some(stretch) = self.rings.get(conflict.ring) else {
+            return (0.0, 0.0);
+        };
+        let count = stretch.may_hold.len();
+        let hidden = (0..count).filter(|&place| stretch.may_hold[place]);
+        let way_m = |place: usize| {
+            let round_rad = site.round_rad(angle_rad(site, place, count), conflict.angle_rad);
+            let back_rad = if ring.kind == LaneKind::Pavement {
+                TAU - round_rad
+            } else {
+                TAU
+            };
+            ring.circle.radius_m * round_rad.min(back_rad)
+        };
+        let nearest_m = hidden.clone().map(way_m).fold(f64::INFINITY, f64::min);
+        let comes_s = nearest_m / fastest_mps(ring.kind, road_mps);
+        (comes_s, 1.0 - hidden.count() as f64 / count.max(1) as f64)
+    }
+}
+
+fn is_listed(objects: &[Object], at_m: [f64; 2]) -> bool {
+    objects.iter().any(|object| {
+        let [x, y, _] = object.centre_m;
+        let reach_m = LISTED_M.max(object.length_m / 2.0 + 1.0);
+        libm::hypot(x - at_m[0], y - at_m[1]) < reach_m
+    })
+}
+
+impl Stretch {
+    /// One place further on; on foot one goes both ways.
+    fn spread(&mut self, both_ways: bool) {
+        let before = self.may_hold.clone();
+        let count = before.len();
+        for (place, may_hold) in self.may_hold.iter_mut().enumerate() {
+            *may_hold |= before[(place + count - 1) % count];
+            *may_hold |= both_ways && before[(place + 1) % count];
+        }
+    }
+}
+
+pub(super) fn fastest_mps(kind: LaneKind, road_mps: f64) -> f64 {
+    match kind {
+        LaneKind::Road => road_mps,
+        LaneKind::Bikeway => CYCLIST_MPS,
+        LaneKind::Pavement => WALKER_MPS,
     }
 }
 
