@@ -3,6 +3,7 @@
 use crate::ego::{Pose, Sweep};
 use crate::grid::Grid;
 use crate::parameter::{choices, parameters};
+use crate::roadmap::Ring;
 use crate::roundabout::{Advice, ArmAdvice, Hindrance, Place, UserOnLane, Window};
 use crate::time::{Span, Time};
 use crate::track::Object;
@@ -310,6 +311,11 @@ fn roundabout_of(revolution: u32, advice: &Advice) -> roundabout::Roundabout {
             offset: user.on.offset_m as f32,
         })
     };
+    let ring = |ring: &Ring| roundabout::RoundaboutRing {
+        kind: ring.kind.number(),
+        radius: ring.circle.radius_m as f32,
+        width: ring.width_m as f32,
+    };
     roundabout::Roundabout {
         revolution,
         name: advice.name.clone(),
@@ -321,6 +327,7 @@ fn roundabout_of(revolution: u32, advice: &Advice) -> roundabout::Roundabout {
         arms: List(advice.arms.iter().map(arm).collect()),
         windows: List(advice.windows.iter().map(window).collect()),
         users: List(advice.users.iter().filter_map(user).collect()),
+        rings: List(advice.rings.iter().map(ring).collect()),
     }
 }
 

@@ -5,7 +5,9 @@
 use kreisel::wire::grid_tile::{GridTile, encode_cells};
 use kreisel::wire::message::List;
 use kreisel::wire::object_list::{Object, ObjectList};
-use kreisel::wire::roundabout::{ConflictWindow, LaneUser, Roundabout, RoundaboutArm};
+use kreisel::wire::roundabout::{
+    ConflictWindow, LaneUser, Roundabout, RoundaboutArm, RoundaboutRing,
+};
 use kreisel::wire::status::Status;
 use kreisel::wire::{FieldDescription, Message};
 use prost_reflect::{DescriptorPool, DynamicMessage, Value};
@@ -54,6 +56,7 @@ fn the_odvd_lists_every_field_of_every_message_that_is_published() {
         table::<RoundaboutArm>(),
         table::<ConflictWindow>(),
         table::<LaneUser>(),
+        table::<RoundaboutRing>(),
         table::<Roundabout>(),
     ];
     assert_eq!(odvd_messages(), expected);

@@ -5,6 +5,7 @@ use super::lanes::OnLane;
 use super::sight::Unseen;
 use super::site::{Entry, Site};
 use super::{RoundaboutParameters, Window};
+use crate::roadmap::Ring;
 
 /// How far the vehicle has come (thesis: start, to the roundabout, brake, in the roundabout,
 /// exit).
@@ -96,6 +97,8 @@ pub struct Advice {
     pub centre_m: [f64; 2],
     /// Outer diameter.
     pub diameter_m: f64,
+    /// Its lanes, from the inside out, in the local frame.
+    pub rings: Vec<Ring>,
     /// How far the vehicle has come.
     pub state: State,
     /// The arm that the vehicle is at.

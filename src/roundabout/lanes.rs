@@ -93,7 +93,13 @@ struct Candidate {
 
 impl Belief {
     /// Takes in where a road user is now; gives the lanes that it may be on, the likeliest first.
-    pub(super) fn update(&mut self, site: &Site, object: &Object, found: &mut Vec<OnLane>) {
+    pub(super) fn update(
+        &mut self,
+        site: &Site,
+        object: &Object,
+        passed_s: f64,
+        found: &mut Vec<OnLane>,
+    ) {
         let mut candidates = vec![Candidate {
             on: OnLane {
                 place: Place::Elsewhere,
@@ -130,9 +136,12 @@ impl Belief {
         } else {
             1.0
         };
+        let gone_m = speed_mps * passed_s;
         let weights: Vec<f64> = candidates
             .iter()
-            .map(|candidate| candidate.likelihood * self.prior(&candidate.on, candidates.len()))
+            .map(|candidate| {
+                candidate.likelihood * self.prior(&candidate.on, candidates.len(), gone_m)
+            })
             .collect();
         let sum: f64 = weights.iter().sum();
         self.lanes.clear();
@@ -152,7 +161,7 @@ impl Belief {
     }
 
     /// How probable a lane is before it is known where somebody is now.
-    fn prior(&self, on: &OnLane, lanes: usize) -> f64 {
+    fn prior(&self, on: &OnLane, lanes: usize, gone_m: f64) -> f64 {
         let fresh = 1.0 / lanes as f64;
         // Nobody knows where somebody was who was never seen.
         if self.lanes.is_empty() {
@@ -170,7 +179,8 @@ impl Belief {
             .iter()
             .filter(|(place, _)| matches!(place, Place::Ring(_)));
         let round: f64 = rings.map(|(_, probability)| probability).sum();
-        stayed.max((1.0 - STAYS) * round)
+        // Who leaves does so somewhere along the mouth.
+        stayed + (1.0 - STAYS) * round * (gone_m / MOUTH_M).clamp(0.0, 1.0)
     }
 }
 

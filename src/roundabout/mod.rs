@@ -174,7 +174,7 @@ impl Watcher {
         let mut beliefs = std::mem::take(&mut self.beliefs);
         for (object, lanes) in situation.objects.iter().zip(&mut self.lanes) {
             let mut belief = beliefs.remove(&object.id).unwrap_or_default();
-            belief.update(site, object, lanes);
+            belief.update(site, object, passed_s, lanes);
             self.beliefs.insert(object.id, belief);
         }
         self.advise(index, situation);
@@ -219,6 +219,7 @@ impl Watcher {
         advice.name.clone_from(&site.name);
         advice.centre_m = site.centre_m;
         advice.diameter_m = 2.0 * site.outer_m;
+        advice.rings.clone_from(&site.rings);
         advice.state = own.state;
         advice.own_arm = own.arm;
         advice.users.clear();

@@ -4,16 +4,19 @@ use std::collections::BTreeMap;
 
 use crate::wire::grid_tile::GridTile;
 use crate::wire::object_list::ObjectList;
+use crate::wire::roundabout::Roundabout;
 use crate::wire::status::Status;
 use crate::wire::{Envelope, Message};
 
 /// More bytes of tiles than this are no map that a daemon keeps: they are let go, and come again in turn.
 const MOST_TILE_BYTES: usize = 1 << 20;
 
-/// The newest list, Status and tiles, as the frames that they came in.
+/// The newest list, what was said of a roundabout with it, Status and tiles, as the frames that they came in.
 #[derive(Debug, Default)]
 pub(super) struct Newest {
     list: Vec<u8>,
+    /// Of the same revolution.
+    roundabout: Vec<u8>,
     status: Vec<u8>,
     map_id: u32,
     tiles: BTreeMap<(i32, i32), Vec<u8>>,
@@ -21,8 +24,8 @@ pub(super) struct Newest {
 }
 
 impl Newest {
-    /// Takes the frame that a datagram begins with, if it is one for the page: a list, a Status or a tile without
-    /// damage. Gives it without what follows it.
+    /// Takes the frame that a datagram begins with, if it is one for the page: a list, what goes with it, a Status or a tile
+    /// without damage. Gives it without what follows it.
     pub(super) fn take<'a>(&mut self, datagram: &'a [u8]) -> Option<&'a [u8]> {
         let (envelope, rest) = Envelope::from_datagram(datagram).ok()?;
         let frame = &datagram[..datagram.len() - rest];
@@ -30,6 +33,11 @@ impl Newest {
             ObjectList::ID => {
                 ObjectList::decode(envelope.payload, 0).ok()?;
                 self.list = frame.to_vec();
+                self.roundabout.clear();
+            }
+            Roundabout::ID => {
+                Roundabout::decode(envelope.payload, 0).ok()?;
+                self.roundabout = frame.to_vec();
             }
             Status::ID => {
                 Status::decode(envelope.payload, 0).ok()?;
@@ -44,6 +52,7 @@ impl Newest {
     /// Lets go of all of it.
     pub(super) fn clear(&mut self) {
         self.list.clear();
+        self.roundabout.clear();
         self.status.clear();
         self.tiles.clear();
         self.tile_bytes = 0;
@@ -64,7 +73,7 @@ impl Newest {
     /// Appends all of it.
     pub(super) fn put(&self, out: &mut Vec<u8>) {
         let tiles = self.tiles.values();
-        for frame in tiles.chain([&self.status, &self.list]) {
+        for frame in tiles.chain([&self.status, &self.list, &self.roundabout]) {
             out.extend_from_slice(frame);
         }
     }
@@ -112,6 +121,10 @@ mod tests {
         newest.take(&frame(&Status::default()));
         assert_eq!(kept(&newest), [2022, 2022, 2023, 2021]);
         newest.take(&tile(2, 7, 0));
+        newest.take(&frame(&Roundabout::default()));
+        assert_eq!(kept(&newest), [2022, 2023, 2021, 2024]);
+        // What was said of it holds for its own revolution.
+        newest.take(&frame(&ObjectList::default()));
         assert_eq!(kept(&newest), [2022, 2023, 2021]);
     }
 

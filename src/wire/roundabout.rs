@@ -69,6 +69,18 @@ super::message! {
 }
 
 super::message! {
+    /// A lane of the circle, or a way around it.
+    pub struct RoundaboutRing = 2029 "kreisel.RoundaboutRing" {
+        /// 0: road; 1: bikeway; 2: pavement.
+        1 => kind: u32,
+        /// Of its middle, metres.
+        2 => radius: f32,
+        /// From edge to edge, metres.
+        3 => width: f32,
+    }
+}
+
+super::message! {
     /// The nearest roundabout of the map: road users on its lanes, and at each arm the gap. Advice, no command.
     pub struct Roundabout = 2024 "kreisel.Roundabout" {
         /// That of the object list of the same revolution.
@@ -92,5 +104,7 @@ super::message! {
         9 => windows: List<ConflictWindow>,
         /// Road users on lanes, each with its length before it.
         10 => users: List<LaneUser>,
+        /// Lanes of the circle from the inside out, each with its length before it.
+        11 => rings: List<RoundaboutRing>,
     }
 }

@@ -31,7 +31,7 @@ function forget() {
   world.map.clear();
   Object.assign(world, {
     objects: [], trails: new Map(), histories: new Map(), path: [], points: null, heading: null, vehicle: null,
-    groundZ: 0, status: null, run: 0, time: null,
+    groundZ: 0, status: null, run: 0, time: null, roundabout: null,
   });
   latency = new LatencyLine();
   arrivals = [];
@@ -41,7 +41,7 @@ function readColours() {
   const style = getComputedStyle(document.documentElement);
   const of = (name) => style.getPropertyValue(`--${name}`).trim();
   const channels = (name) => of(name).split(/[\s,]+/).map(Number);
-  const names = ["back", "text", "faint", "ground", "loose", "path", "vehicle", "median", "p99",
+  const names = ["back", "text", "faint", "ground", "loose", "path", "vehicle", "median", "p99", "stop",
     "car", "cyclist", "pedestrian", "truck", "unclassified"];
   colours = Object.fromEntries(names.map((name) => [name, of(name)]));
   colours.clusters = of("clusters").split(",").map((colour) => colour.trim());
@@ -85,8 +85,9 @@ function take({ heading, points, messages }) {
     else if (kind === "status") world.status = message;
     else if (kind === "list" && time !== world.time) {
       isNew = true;
+      world.roundabout = null;
       takeList(message, time, now);
-    }
+    } else if (kind === "roundabout" && time === world.time) world.roundabout = message;
   }
   Object.assign(world, { heading, points, heard: now });
   const [, , up] = heading.origin_m;

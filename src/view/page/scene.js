@@ -76,6 +76,7 @@ export function draw(context, camera, world, colours) {
   context.fillStyle = colours.back;
   context.fillRect(0, 0, camera.width, camera.height);
   if (world.layers.map) drawMap(context, camera, world);
+  if (world.roundabout) drawRoundabout(context, camera, world, colours);
   drawPath(context, camera, world, colours);
   if (world.layers.points) drawPoints(context, camera, world, colours);
   drawVehicle(context, camera, world, colours);
@@ -92,6 +93,44 @@ function drawMap(context, camera, world) {
   const [cosine, sine] = [Math.cos(anchor.yaw), Math.sin(anchor.yaw)];
   const reach = (camera.width + camera.height) / camera.pixelsPerMetre / Math.max(camera.flat, 0.2);
   world.map.draw(context, [dx * cosine + dy * sine, dy * cosine - dx * sine], reach);
+  context.restore();
+}
+
+// Lanes as rings; at each arm a bar of time, outward, a metre a second: green or red as one may enter, with the own window
+// and everybody's beside it.
+function drawRoundabout(context, camera, { roundabout, groundZ }, colours) {
+  const { arms, windows, rings, diameter, ownArm } = roundabout;
+  context.save();
+  camera.enterPlane(context, { x: roundabout.x, y: roundabout.y, yaw: 0 }, groundZ);
+  context.strokeStyle = colours.path;
+  for (const { kind, radius, width } of rings) {
+    context.globalAlpha = kind === 0 ? 0.22 : 0.1;
+    context.lineWidth = width;
+    context.beginPath();
+    context.arc(0, 0, radius, 0, 2 * Math.PI);
+    context.stroke();
+  }
+  context.globalAlpha = 1;
+  const bar = (from, to, aside, colour) => {
+    context.strokeStyle = colour;
+    context.beginPath();
+    context.moveTo(diameter / 2 + from, aside);
+    context.lineTo(diameter / 2 + Math.min(to, 15), aside);
+    context.stroke();
+  };
+  arms.forEach((arm, number) => {
+    if (arm.hindrance === 3) return;
+    context.save();
+    context.rotate(arm.bearing);
+    context.lineWidth = number === ownArm ? 0.8 : 0.4;
+    bar(0, arm.gap, 0, arm.mayEnter ? colours.path : colours.stop);
+    bar(arm.ownBegin, arm.ownEnd, 0.9, colours.vehicle);
+    for (const window of windows.filter((window) => window.arm === number)) {
+      context.globalAlpha = Math.max(0.2, window.probability);
+      bar(window.begin, window.end, -0.9, colours.p99);
+    }
+    context.restore();
+  });
   context.restore();
 }
 

@@ -30,7 +30,23 @@ const STATUS = {
   42: ["packets", u32], 43: ["packetsLost", u32], 45: ["returnMode", text], 46: ["sensorClock", text],
 };
 
-const KINDS = { 2021: ["list", OBJECT_LIST], 2022: ["tile", GRID_TILE], 2023: ["status", STATUS] };
+const ARM = {
+  1: ["bearing", f32], 2: ["mayEnter", bool], 3: ["hindrance", u32], 4: ["hinderingObject", u32], 5: ["gap", f32],
+  6: ["ownBegin", f32], 7: ["ownEnd", f32],
+};
+const WINDOW = { 1: ["object", u32], 2: ["arm", u32], 4: ["begin", f32], 5: ["end", f32], 7: ["probability", f32] };
+const RING = { 1: ["kind", u32], 2: ["radius", f32], 3: ["width", f32] };
+const ROUNDABOUT = {
+  2: ["name", text], 3: ["x", f64], 4: ["y", f64], 5: ["diameter", f32], 6: ["state", u32], 7: ["ownArm", s32],
+  8: ["arms", bytes], 9: ["windows", bytes], 11: ["rings", bytes],
+};
+
+const KINDS = {
+  2021: ["list", OBJECT_LIST], 2022: ["tile", GRID_TILE], 2023: ["status", STATUS], 2024: ["roundabout", ROUNDABOUT],
+};
+
+// Lists within messages: their field and what they hold.
+const LISTS = { list: { objects: OBJECT }, roundabout: { arms: ARM, windows: WINDOW, rings: RING } };
 
 // A reader of varints and fixed numbers.
 class Reader {
@@ -97,11 +113,11 @@ function decode(array, fields) {
   return message;
 }
 
-function decodeObjects(array) {
+function decodeList(array, fields) {
   const reader = new Reader(array);
-  const objects = [];
-  while (!reader.isAtEnd) objects.push(decode(reader.take(reader.varint()), OBJECT));
-  return objects;
+  const items = [];
+  while (!reader.isAtEnd) items.push(decode(reader.take(reader.varint()), fields));
+  return items;
 }
 
 // The messages in a row of frames: `0D A4`, a 24-bit length, an envelope. A damaged one costs no other.
@@ -129,7 +145,7 @@ function decodeEnvelope(array) {
   if (!kind) return null;
   const { seconds, microseconds } = decode(sampled, TIME);
   const message = decode(payload, fields);
-  if (kind === "list") message.objects = decodeObjects(message.objects);
+  for (const [name, items] of Object.entries(LISTS[kind] ?? {})) message[name] = decodeList(message[name], items);
   return { kind, time: seconds + microseconds / 1e6, message };
 }
 
