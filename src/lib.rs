@@ -7,7 +7,8 @@
 //! ```text
 //! datagram -> wire -> cloud -> odometry -> ego -> ground -> cluster -> track -> wire -> datagram
 //!                |                        /  \ \___ beams ___________/ \-> grid -/
-//!                \-> poses --------------/    \-------------------------/
+//!                \-> poses --------------/    \-------------------------/    /
+//! map of roads -> roadmap -> roundabout (lanes, gap) ---------------------/
 //! ```
 //!
 //! Everything but the shell is pure: no I/O, no clock, no thread, no global state. The same

@@ -60,7 +60,7 @@ impl Ring {
 pub struct Access {
     /// In the map.
     pub lane: LaneId,
-    /// As far as [`super::arms::REACH_M`] from the circle, in the direction of driving.
+    /// As far as 60 m from the circle, in the direction of driving.
     pub way: Polyline,
     /// From edge to edge.
     pub width_m: f64,

@@ -286,3 +286,6 @@ impl Watcher {
         self.advice = advice;
     }
 }
+
+#[cfg(test)]
+mod tests;

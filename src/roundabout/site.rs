@@ -57,8 +57,6 @@ pub(super) struct Exit {
     pub(super) width_m: f64,
     /// Where it leaves the circle.
     pub(super) mouth_rad: f64,
-    /// Ways of others that it crosses.
-    pub(super) conflicts: Vec<Conflict>,
 }
 
 /// Where the way in or out of an arm crosses a ring.
@@ -188,7 +186,7 @@ impl Site {
     fn entry(&self, way: &Polyline, width_m: f64) -> Option<Entry> {
         let road = self.outermost_road()?;
         let way = self.prolonged(way, road)?;
-        let conflicts = self.crossings(&way, Some(road));
+        let conflicts = self.crossings(&way, road);
         Some(Entry {
             way,
             width_m,
@@ -199,12 +197,10 @@ impl Site {
     fn exit(&self, way: &Polyline, width_m: f64) -> Option<Exit> {
         let road = self.outermost_road()?;
         let way = self.prolonged(&way.reversed(), road)?.reversed();
-        let conflicts = self.crossings(&way, None);
         Some(Exit {
             mouth_rad: self.angle_rad(*way.points_m().first()?),
             way,
             width_m,
-            conflicts,
         })
     }
 
@@ -236,10 +232,10 @@ impl Site {
     }
 
     /// Rings that a way crosses, and the one that it ends on.
-    fn crossings(&self, way: &Polyline, ends_on: Option<usize>) -> Vec<Conflict> {
+    fn crossings(&self, way: &Polyline, ends_on: usize) -> Vec<Conflict> {
         let mut found = vec![];
         for (index, ring) in self.rings.iter().enumerate() {
-            if ends_on == Some(index) {
+            if ends_on == index {
                 let end_m = way.at(way.length_m()).0;
                 found.push(Conflict {
                     ring: index,
