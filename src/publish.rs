@@ -265,6 +265,13 @@ fn fill_list(list: &mut ObjectList, heading: &Heading<'_>, objects: &[Object], o
     };
 }
 
+/// What a datagram has room for of a roundabout's lists, beside each other: more is no street.
+const MOST_ARMS: usize = 32;
+const MOST_WINDOWS: usize = 800;
+const MOST_USERS: usize = 256;
+const MOST_RINGS: usize = 16;
+const LONGEST_NAME: usize = 100;
+
 fn roundabout_of(revolution: u32, advice: &Advice) -> roundabout::Roundabout {
     let arm = |arm: &ArmAdvice| {
         let (hindrance, hindering_object) = match arm.hindrance {
@@ -316,18 +323,29 @@ fn roundabout_of(revolution: u32, advice: &Advice) -> roundabout::Roundabout {
         radius: ring.circle.radius_m as f32,
         width: ring.width_m as f32,
     };
+    let mut soonest: Vec<&Window> = advice.windows.iter().collect();
+    if soonest.len() > MOST_WINDOWS {
+        soonest.sort_by(|a, b| a.begin_s.total_cmp(&b.begin_s));
+    }
     roundabout::Roundabout {
         revolution,
-        name: advice.name.clone(),
+        name: advice.name.chars().take(LONGEST_NAME).collect(),
         x: advice.centre_m[0],
         y: advice.centre_m[1],
         diameter: advice.diameter_m as f32,
         state: advice.state.number(),
         own_arm: advice.own_arm.map_or(-1, |arm| arm as i32),
-        arms: List(advice.arms.iter().map(arm).collect()),
-        windows: List(advice.windows.iter().map(window).collect()),
-        users: List(advice.users.iter().filter_map(user).collect()),
-        rings: List(advice.rings.iter().map(ring).collect()),
+        arms: List(advice.arms.iter().take(MOST_ARMS).map(arm).collect()),
+        windows: List(soonest.into_iter().take(MOST_WINDOWS).map(window).collect()),
+        users: List(
+            advice
+                .users
+                .iter()
+                .filter_map(user)
+                .take(MOST_USERS)
+                .collect(),
+        ),
+        rings: List(advice.rings.iter().take(MOST_RINGS).map(ring).collect()),
     }
 }
 
@@ -479,6 +497,51 @@ mod tests {
         let sight = Sight::of(&object(1, -5.0, 5.0), &Pose::SENSOR);
         assert!((sight.azimuth_rad.to_degrees() - 45.0).abs() < 1e-9);
         assert!(sight.zenith_rad < 0.0);
+    }
+
+    #[test]
+    fn the_busiest_roundabout_fits_a_datagram() {
+        let window = Window {
+            object_id: u32::MAX,
+            arm: 1000,
+            conflict: 0,
+            kind: crate::roadmap::LaneKind::Pavement,
+            begin_s: 14.0,
+            end_s: 15.0,
+            expected_s: 14.5,
+            probability: 0.5,
+            way_m: 50.0,
+        };
+        let user = UserOnLane {
+            object_id: u32::MAX,
+            on: crate::roundabout::OnLane {
+                place: Place::Exit(1000, 0),
+                probability: 0.5,
+                along_m: 1.0,
+                offset_m: 1.0,
+                speed_mps: 1.0,
+                mean_speed_mps: 1.0,
+            },
+        };
+        let soon = Window {
+            begin_s: 0.0,
+            object_id: 1,
+            ..window
+        };
+        let windows = (0..5000).map(|_| window).chain([soon]);
+        let advice = Advice {
+            name: "x".repeat(1000),
+            windows: windows.collect(),
+            users: vec![user; 1000],
+            ..Advice::default()
+        };
+        let mut publisher = publish(|_| {}, &[]);
+        publisher.add_roundabout(&heading(), &advice);
+        let frame = publisher.frames().last().unwrap();
+        assert!(frame.len() < MAX_DATAGRAM_LEN, "{}", frame.len());
+        let (envelope, _) = Envelope::from_datagram(frame).unwrap();
+        let said = roundabout::Roundabout::decode(envelope.payload, 0).unwrap();
+        assert_eq!(said.windows.0[0].object_id, 1);
     }
 
     #[test]
