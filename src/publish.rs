@@ -1,17 +1,18 @@
 //! Last step: objects become messages, and messages the frames that are sent.
 
+mod roundabout;
+
 use crate::ego::{Pose, Sweep};
 use crate::grid::Grid;
 use crate::parameter::{choices, parameters};
-use crate::roadmap::Ring;
-use crate::roundabout::{Advice, ArmAdvice, Hindrance, Place, UserOnLane, Window};
+use crate::roundabout::Advice;
 use crate::time::{Span, Time};
 use crate::track::Object;
 use crate::wire::envelope::Postmark;
 use crate::wire::environment::{Direction, Environment, PerceivedObject};
 use crate::wire::message::List;
 use crate::wire::object_list::ObjectList;
-use crate::wire::{Message, TimeStamp, object_list, opendlv, roundabout};
+use crate::wire::{Message, TimeStamp, object_list, opendlv};
 
 choices! {
     /// Unit of angles in OpenDLV's object messages.
@@ -137,7 +138,7 @@ impl Publisher {
             sampled: heading.time,
             sender_stamp: self.sender_stamp,
         };
-        self.put(&postmark, &roundabout_of(heading.revolution, advice));
+        self.put(&postmark, &roundabout::message(heading.revolution, advice));
     }
 
     /// Makes the frames of what is to be sent of the map after the revolution of a time.
@@ -263,90 +264,6 @@ fn fill_list(list: &mut ObjectList, heading: &Heading<'_>, objects: &[Object], o
         reference_latitude: reference.map_or(0.0, |place| place.latitude_deg),
         reference_longitude: reference.map_or(0.0, |place| place.longitude_deg),
     };
-}
-
-/// What a datagram has room for of a roundabout's lists, beside each other: more is no street.
-const MOST_ARMS: usize = 32;
-const MOST_WINDOWS: usize = 800;
-const MOST_USERS: usize = 256;
-const MOST_RINGS: usize = 16;
-const LONGEST_NAME: usize = 100;
-
-fn roundabout_of(revolution: u32, advice: &Advice) -> roundabout::Roundabout {
-    let arm = |arm: &ArmAdvice| {
-        let (hindrance, hindering_object) = match arm.hindrance {
-            None => (0, 0),
-            Some(Hindrance::RoadUser(id)) => (1, id),
-            Some(Hindrance::Unseen) => (2, 0),
-            Some(Hindrance::NoEntry) => (3, 0),
-        };
-        roundabout::RoundaboutArm {
-            bearing: arm.bearing_rad as f32,
-            may_enter: arm.may_enter,
-            hindrance,
-            hindering_object,
-            gap: arm.gap_s as f32,
-            own_begin: arm.own_window_s[0] as f32,
-            own_end: arm.own_window_s[1] as f32,
-            margin: arm.margin_s as f32,
-            seen_share: arm.seen_share as f32,
-        }
-    };
-    let window = |window: &Window| roundabout::ConflictWindow {
-        object_id: window.object_id,
-        arm: window.arm as u32,
-        kind: window.kind.number(),
-        begin: window.begin_s as f32,
-        end: window.end_s as f32,
-        expected: window.expected_s as f32,
-        probability: window.probability as f32,
-        way: window.way_m as f32,
-    };
-    let user = |user: &UserOnLane| {
-        let (lane_kind, number) = match user.on.place {
-            Place::Ring(number) => (0, number),
-            Place::Entry(arm, _) => (1, arm),
-            Place::Exit(arm, _) => (2, arm),
-            Place::Elsewhere => return None,
-        };
-        Some(roundabout::LaneUser {
-            object_id: user.object_id,
-            lane_kind,
-            number: number as u32,
-            probability: user.on.probability as f32,
-            along: user.on.along_m as f32,
-            offset: user.on.offset_m as f32,
-        })
-    };
-    let ring = |ring: &Ring| roundabout::RoundaboutRing {
-        kind: ring.kind.number(),
-        radius: ring.circle.radius_m as f32,
-        width: ring.width_m as f32,
-    };
-    let mut soonest: Vec<&Window> = advice.windows.iter().collect();
-    if soonest.len() > MOST_WINDOWS {
-        soonest.sort_by(|a, b| a.begin_s.total_cmp(&b.begin_s));
-    }
-    roundabout::Roundabout {
-        revolution,
-        name: advice.name.chars().take(LONGEST_NAME).collect(),
-        x: advice.centre_m[0],
-        y: advice.centre_m[1],
-        diameter: advice.diameter_m as f32,
-        state: advice.state.number(),
-        own_arm: advice.own_arm.map_or(-1, |arm| arm as i32),
-        arms: List(advice.arms.iter().take(MOST_ARMS).map(arm).collect()),
-        windows: List(soonest.into_iter().take(MOST_WINDOWS).map(window).collect()),
-        users: List(
-            advice
-                .users
-                .iter()
-                .filter_map(user)
-                .take(MOST_USERS)
-                .collect(),
-        ),
-        rings: List(advice.rings.iter().take(MOST_RINGS).map(ring).collect()),
-    }
 }
 
 fn environment_of(valid_until: Time, objects: &[Object], sensor: &Pose) -> Environment {
@@ -497,51 +414,6 @@ mod tests {
         let sight = Sight::of(&object(1, -5.0, 5.0), &Pose::SENSOR);
         assert!((sight.azimuth_rad.to_degrees() - 45.0).abs() < 1e-9);
         assert!(sight.zenith_rad < 0.0);
-    }
-
-    #[test]
-    fn the_busiest_roundabout_fits_a_datagram() {
-        let window = Window {
-            object_id: u32::MAX,
-            arm: 1000,
-            conflict: 0,
-            kind: crate::roadmap::LaneKind::Pavement,
-            begin_s: 14.0,
-            end_s: 15.0,
-            expected_s: 14.5,
-            probability: 0.5,
-            way_m: 50.0,
-        };
-        let user = UserOnLane {
-            object_id: u32::MAX,
-            on: crate::roundabout::OnLane {
-                place: Place::Exit(1000, 0),
-                probability: 0.5,
-                along_m: 1.0,
-                offset_m: 1.0,
-                speed_mps: 1.0,
-                mean_speed_mps: 1.0,
-            },
-        };
-        let soon = Window {
-            begin_s: 0.0,
-            object_id: 1,
-            ..window
-        };
-        let windows = (0..5000).map(|_| window).chain([soon]);
-        let advice = Advice {
-            name: "x".repeat(1000),
-            windows: windows.collect(),
-            users: vec![user; 1000],
-            ..Advice::default()
-        };
-        let mut publisher = publish(|_| {}, &[]);
-        publisher.add_roundabout(&heading(), &advice);
-        let frame = publisher.frames().last().unwrap();
-        assert!(frame.len() < MAX_DATAGRAM_LEN, "{}", frame.len());
-        let (envelope, _) = Envelope::from_datagram(frame).unwrap();
-        let said = roundabout::Roundabout::decode(envelope.payload, 0).unwrap();
-        assert_eq!(said.windows.0[0].object_id, 1);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use crate::roadmap::{LaneKind, Roadmap};
-use crate::roundabout::{Advice, Place, RoundaboutParameters, Situation, Watcher};
+use crate::roundabout::{Advice, Place, RoundaboutParameters, Situation, Watcher, Window};
 use crate::time::Time;
 use crate::track::{Class, Object};
 
@@ -23,19 +23,14 @@ const MATCH_M: f64 = 2.0;
 #[derive(Debug)]
 pub(super) struct GapScore {
     truth: Watcher,
+    /// That should be left.
+    margin_s: f64,
     arms: Vec<ArmScore>,
     /// The arm that the vehicle was at first.
     own_arm: Option<usize>,
     revolutions: usize,
     agreed: usize,
-    /// Times that road users were said to come, by true road user and arm: when it was said, and when they
-    /// should come.
-    expected: ByComer<Vec<f64>>,
-    errors_s: Vec<f64>,
-    /// What was said of staying, by true road user and arm, last before the judgement; and when he would truly
-    /// come.
-    stays: ByComer<(bool, f64)>,
-    judged: [usize; 2],
+    comings: Comings,
     /// Right and all, of cars and of cyclists.
     lanes: [[usize; 2]; 2],
 }
@@ -58,14 +53,12 @@ impl GapScore {
         truth.take_map(roads);
         Self {
             truth,
+            margin_s: parameters.margin_s,
             arms: vec![],
             own_arm: None,
             revolutions: 0,
             agreed: 0,
-            expected: BTreeMap::new(),
-            errors_s: vec![],
-            stays: BTreeMap::new(),
-            judged: [0; 2],
+            comings: Comings::default(),
             lanes: [[0; 2]; 2],
         }
     }
@@ -87,73 +80,21 @@ impl GapScore {
             .zip(&true_advice.arms)
         {
             self.agreed += usize::from(said.may_enter == known.may_enter);
-            score.take(said.may_enter, known.may_enter, known.margin_s, known.gap_s);
+            let short_s = self.margin_s - known.margin_s;
+            score.take(said.may_enter, known.may_enter, short_s, known.gap_s);
         }
         let pairs = pairs(objects, truth.objects);
         compare_lanes(&mut self.lanes, advice, true_advice, truth.objects, &pairs);
-        let now_s = truth.time.seconds();
-        let ours: BTreeMap<u32, u32> = pairs.iter().map(|&(object, user)| (user, object)).collect();
-        let on_circle = |windows: &'_ Advice| -> ByComer<(f64, f64)> {
-            let windows = windows
-                .windows
-                .iter()
-                .filter(|window| window.kind == LaneKind::Road);
-            windows
-                .map(|window| {
-                    (
-                        (window.object_id, window.arm),
-                        (window.expected_s, window.probability),
-                    )
-                })
-                .collect()
-        };
-        let (said, known) = (on_circle(advice), on_circle(true_advice));
-        for (&(user, arm), &(true_s, _)) in &known {
-            if true_s <= 0.0 {
-                // It has come: all that was said of when is judged by now.
-                let predictions = self.expected.remove(&(user, arm)).unwrap_or_default();
-                self.errors_s
-                    .extend(predictions.iter().map(|at_s| (at_s - now_s).abs()));
-                if let Some((stays, _)) = self.stays.remove(&(user, arm)) {
-                    self.judged[0] += usize::from(stays);
-                    self.judged[1] += 1;
-                }
-                continue;
-            }
-            let Some(&object) = ours.get(&user) else {
-                continue;
-            };
-            let window = said.get(&(object, arm));
-            if let Some((expected_s, _)) = window.filter(|_| HORIZON_S.contains(&true_s)) {
-                self.expected
-                    .entry((user, arm))
-                    .or_default()
-                    .push(now_s + expected_s);
-            }
-            let stays = self.stays.entry((user, arm)).or_insert((true, 0.0));
-            stays.1 = now_s + true_s;
-        }
-        for (&(user, arm), (stays, comes_s)) in &mut self.stays {
-            if *comes_s - now_s < JUDGED_S {
-                continue;
-            }
-            let window = ours.get(&user).and_then(|&object| said.get(&(object, arm)));
-            *stays = window.is_some_and(|(_, probability)| *probability >= 0.5);
-        }
-        judge_leavers(
-            true_advice,
-            &mut self.expected,
-            &mut self.stays,
-            now_s,
-            &mut self.judged,
-        );
+        let ours = pairs.iter().map(|&(object, user)| (user, object)).collect();
+        self.comings
+            .take(advice, true_advice, &ours, truth.time.seconds());
     }
 
     /// Lines for people, and for scripts: of the vehicle's own arm, if it is at one, and of all.
     pub(super) fn summary(&self) -> String {
         let own = self.own_arm.and_then(|arm| self.arms.get(arm..=arm));
         let own = own.map(|own| format!("own arm: {}\n", gaps_of(own)));
-        let mut errors_s = self.errors_s.clone();
+        let mut errors_s = self.comings.errors_s.clone();
         errors_s.sort_by(f64::total_cmp);
         let quantile = |part: f64| {
             let index = (part * errors_s.len() as f64) as usize;
@@ -173,7 +114,7 @@ impl GapScore {
             quantile(0.5),
             quantile(0.95),
             errors_s.len(),
-            share(self.judged),
+            share(self.comings.judged),
             share(self.lanes[0]),
             share(self.lanes[1]),
         )
@@ -194,11 +135,12 @@ fn gaps_of(arms: &[ArmScore]) -> String {
 }
 
 impl ArmScore {
-    fn take(&mut self, said: bool, known: bool, margin_s: f64, gap_s: f64) {
+    /// `short_s` is missing to the margin.
+    fn take(&mut self, said: bool, known: bool, short_s: f64, gap_s: f64) {
         if said && !self.was_open {
             self.announced += 1;
             self.unsafe_goes += usize::from(!known);
-            self.clearly_unsafe += usize::from(!known && margin_s < 2.0 - CLEARLY_S);
+            self.clearly_unsafe += usize::from(!known && short_s > CLEARLY_S);
         }
         self.was_open = said;
         match (&mut self.gap, known) {
@@ -219,25 +161,84 @@ impl ArmScore {
 /// By true road user and arm.
 type ByComer<T> = BTreeMap<(u32, usize), T>;
 
-/// Who is truly on a way out does not come to that arm.
-fn judge_leavers(
-    known: &Advice,
-    expected: &mut ByComer<Vec<f64>>,
-    stays: &mut ByComer<(bool, f64)>,
-    now_s: f64,
-    judged: &mut [usize; 2],
-) {
-    for user in known.users.iter().filter(|user| user.on.probability > 0.99) {
-        let Place::Exit(arm, _) = user.on.place else {
-            continue;
-        };
-        expected.remove(&(user.object_id, arm));
-        // He would have come by then: that is when it is judged.
-        let known = stays.get(&(user.object_id, arm)).copied();
-        if let Some((said, _)) = known.filter(|(_, at_s)| at_s - now_s < JUDGED_S) {
-            stays.remove(&(user.object_id, arm));
-            judged[0] += usize::from(!said);
-            judged[1] += 1;
+/// Who comes when to the circle's conflict points, and who does not.
+#[derive(Debug, Default)]
+struct Comings {
+    /// Times that road users were said to come, by true road user and arm: when it was said, and when they
+    /// should come.
+    expected: ByComer<Vec<f64>>,
+    errors_s: Vec<f64>,
+    /// What was said of staying, by true road user and arm, last before the judgement; and when he would truly
+    /// come.
+    stays: ByComer<(bool, f64)>,
+    judged: [usize; 2],
+}
+
+/// When each road user most likely comes to each arm's conflict point on the circle, and how probably.
+fn on_circle(advice: &Advice) -> ByComer<(f64, f64)> {
+    let windows = advice.windows.iter();
+    let windows = windows.filter(|window| window.kind == LaneKind::Road);
+    let who = |window: &Window| (window.object_id, window.arm);
+    let when = |window: &Window| (window.expected_s, window.probability);
+    windows.map(|window| (who(window), when(window))).collect()
+}
+
+impl Comings {
+    fn take(&mut self, said: &Advice, known: &Advice, ours: &BTreeMap<u32, u32>, now_s: f64) {
+        let (said, true_comings) = (on_circle(said), on_circle(known));
+        for (&comer, &(true_s, _)) in &true_comings {
+            if true_s <= 0.0 {
+                self.has_come(comer, now_s);
+                continue;
+            }
+            let (user, arm) = comer;
+            let Some(&object) = ours.get(&user) else {
+                continue;
+            };
+            let window = said.get(&(object, arm));
+            if let Some((expected_s, _)) = window.filter(|_| HORIZON_S.contains(&true_s)) {
+                let expected = self.expected.entry(comer).or_default();
+                expected.push(now_s + expected_s);
+            }
+            let stays = self.stays.entry(comer).or_insert((true, 0.0));
+            stays.1 = now_s + true_s;
+        }
+        for (&(user, arm), (stays, comes_s)) in &mut self.stays {
+            if *comes_s - now_s < JUDGED_S {
+                continue;
+            }
+            let window = ours.get(&user).and_then(|&object| said.get(&(object, arm)));
+            *stays = window.is_some_and(|(_, probability)| *probability >= 0.5);
+        }
+        self.judge_leavers(known, now_s);
+    }
+
+    /// All that was said of when is judged by now.
+    fn has_come(&mut self, comer: (u32, usize), now_s: f64) {
+        let predictions = self.expected.remove(&comer).unwrap_or_default();
+        let errors_s = predictions.iter().map(|at_s| (at_s - now_s).abs());
+        self.errors_s.extend(errors_s);
+        if let Some((stays, _)) = self.stays.remove(&comer) {
+            self.judged[0] += usize::from(stays);
+            self.judged[1] += 1;
+        }
+    }
+
+    /// Who is truly on a way out does not come to that arm.
+    fn judge_leavers(&mut self, known: &Advice, now_s: f64) {
+        for user in known.users.iter().filter(|user| user.on.probability > 0.99) {
+            let Place::Exit(arm, _) = user.on.place else {
+                continue;
+            };
+            let comer = (user.object_id, arm);
+            self.expected.remove(&comer);
+            // He would have come by then: that is when it is judged.
+            let known = self.stays.get(&comer).copied();
+            if let Some((stays, _)) = known.filter(|(_, at_s)| at_s - now_s < JUDGED_S) {
+                self.stays.remove(&comer);
+                self.judged[0] += usize::from(!stays);
+                self.judged[1] += 1;
+            }
         }
     }
 }

@@ -10,8 +10,8 @@ use super::files::{Output, check_distinct};
 use super::{Completion, roads};
 use crate::ego::geodesy::{Geodetic, LocalFrame};
 use crate::roadmap::{
-    Elements, Roadmap, Roundabout, SIMPLIFIED_WITHIN_M, Simplified, roundabouts, scn, simplified,
-    svg,
+    ArmElements, Elements, LaneKind, Roadmap, Roundabout, SIMPLIFIED_WITHIN_M, Simplified,
+    roundabouts, scn, simplified, svg,
 };
 
 #[derive(Debug, Args)]
@@ -168,7 +168,7 @@ fn describe_one(map: &Roadmap, found: &Found) -> Result<()> {
     for ring in roundabout
         .rings
         .iter()
-        .filter(|ring| ring.kind != crate::roadmap::LaneKind::Road)
+        .filter(|ring| ring.kind != LaneKind::Road)
     {
         say!(
             "  {} from {:.1} to {:.1} m off the centre",
@@ -178,24 +178,7 @@ fn describe_one(map: &Roadmap, found: &Found) -> Result<()> {
         );
     }
     for arm in &elements.arms {
-        let way = |name: &str, width_m: Option<f64>, radius_m: Option<f64>| {
-            let width_m = width_m?;
-            let corner = radius_m.map_or_else(String::new, |radius_m| {
-                format!(", corner radius {radius_m:.1} m")
-            });
-            Some(format!("{name} {width_m:.1} m{corner}"))
-        };
-        let parts = [
-            way("entry", arm.entry_width_m, arm.entry_radius_m),
-            way("exit", arm.exit_width_m, arm.exit_radius_m),
-            arm.divider_m.map(|metres| format!("divider {metres:.1} m")),
-        ];
-        let parts: Vec<_> = parts.into_iter().flatten().collect();
-        say!(
-            "  arm at {:.0} degrees from north: {}",
-            compass_deg(arm.bearing_rad),
-            parts.join("; ")
-        );
+        say!("  {}", described(arm));
     }
     for contradiction in &elements.contradictions {
         say!("  against it: {contradiction}");
@@ -207,6 +190,27 @@ fn describe_one(map: &Roadmap, found: &Found) -> Result<()> {
         simplified.off_m
     );
     Ok(())
+}
+
+fn described(arm: &ArmElements) -> String {
+    let way = |name: &str, width_m: Option<f64>, radius_m: Option<f64>| {
+        let width_m = width_m?;
+        let corner = radius_m.map_or_else(String::new, |radius_m| {
+            format!(", corner radius {radius_m:.1} m")
+        });
+        Some(format!("{name} {width_m:.1} m{corner}"))
+    };
+    let parts = [
+        way("entry", arm.entry_width_m, arm.entry_radius_m),
+        way("exit", arm.exit_width_m, arm.exit_radius_m),
+        arm.divider_m.map(|metres| format!("divider {metres:.1} m")),
+    ];
+    let parts: Vec<_> = parts.into_iter().flatten().collect();
+    let bearing_deg = compass_deg(arm.bearing_rad);
+    format!(
+        "arm at {bearing_deg:.0} degrees from north: {}",
+        parts.join("; ")
+    )
 }
 
 fn geodetic(map: &Roadmap, [x, y]: [f64; 2]) -> Option<Geodetic> {

@@ -5,8 +5,8 @@ use super::circle::Circle;
 use super::network::Network;
 use super::polyline::distance_m;
 use super::rings::{self, SAME_CENTRE_M};
-use super::roundabout::{Ring, Roundabout, Source};
-use super::{DeclaredRoundabout, Roadmap};
+use super::roundabout::{Access, Ring, Roundabout, Source};
+use super::{DeclaredRoundabout, Polyline, Roadmap};
 
 /// All roundabouts of a map.
 pub fn roundabouts(map: &Roadmap) -> Vec<Roundabout> {
@@ -56,10 +56,30 @@ fn from_declared(map: &Roadmap, declared: &DeclaredRoundabout) -> Roundabout {
         let junctions = junctions.filter(move |junction| junction.is_entry == is_entry);
         junctions.filter_map(|junction| map.lane(junction.lane.lane))
     };
-    let entries = accesses(true).map(|lane| access(lane, &roundabout, true));
-    let exits = accesses(false).map(|lane| access(lane, &roundabout, false));
-    roundabout.arms = arms(entries.collect(), exits.collect(), false);
+    let entries: Vec<_> = accesses(true)
+        .map(|lane| access(lane, &roundabout, true))
+        .collect();
+    let exits: Vec<_> = accesses(false)
+        .map(|lane| access(lane, &roundabout, false))
+        .collect();
+    roundabout.is_clockwise = is_clockwise(&roundabout, &entries, &exits);
+    roundabout.arms = arms(entries, exits, roundabout.is_clockwise);
     roundabout
+}
+
+/// Whether ways in and out pass the middle on its left: a map does not say which way round one drives.
+fn is_clockwise(roundabout: &Roundabout, entries: &[Access], exits: &[Access]) -> bool {
+    let [x, y] = roundabout.centre_m();
+    let spin_m = |way: &Polyline, along_m: f64| {
+        let ([at_x, at_y], heading_rad) = way.at(along_m);
+        let (sine, cosine) = libm::sincos(heading_rad);
+        (at_x - x) * sine - (at_y - y) * cosine
+    };
+    let inward = entries
+        .iter()
+        .map(|access| spin_m(&access.way, access.way.length_m()));
+    let outward = exits.iter().map(|access| spin_m(&access.way, 0.0));
+    inward.chain(outward).sum::<f64>() < 0.0
 }
 
 /// From its lanes alone.

@@ -24,7 +24,7 @@ use crate::ego::geodesy::Geodetic;
 pub use circle::Circle;
 pub use curve::{Curve, Vertex};
 pub use draw::svg;
-pub use elements::{Contradiction, Elements, Kind};
+pub use elements::{ArmElements, Contradiction, Elements, Kind};
 pub use find::roundabouts;
 pub use polyline::{Polyline, Station};
 pub use roundabout::{Access, Arm, Ring, Roundabout, Source};

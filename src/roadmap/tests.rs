@@ -314,3 +314,26 @@ fn roads_that_leave_the_extract_are_counted() {
     let map = osm::read(text, None).unwrap();
     assert_eq!(map.skipped["road outside of the extract"], 1);
 }
+
+/// As where traffic drives on the left.
+#[test]
+fn a_mirrored_map_is_driven_clockwise() {
+    let mut map = circle_and_arm(13.0);
+    for lane in &mut map.lanes {
+        if let Curve::Points(vertices) = &mut lane.curve {
+            vertices
+                .iter_mut()
+                .for_each(|vertex| vertex.place_m[0] *= -1.0);
+        }
+    }
+    let found = roundabouts(&map);
+    assert!(found[0].is_clockwise);
+    assert_eq!(Elements::of(&found[0]).arms.len(), 1);
+    map.declared.extend(found[0].declaration(1, &map));
+    let declared = roundabouts(&map);
+    assert_eq!(
+        (declared[0].source, declared[0].is_clockwise),
+        (Source::Declared, true)
+    );
+    assert_eq!(declared[0].arms.len(), 1);
+}

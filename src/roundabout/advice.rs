@@ -1,9 +1,8 @@
 //! What is said of a roundabout, and of each arm.
 
-use super::gap::{self, OwnMotion};
-use super::lanes::OnLane;
+use super::gap::{self, Asked, OwnMotion, User};
+use super::lanes::{OnLane, Place};
 use super::sight::Unseen;
-use super::site::{Entry, Site};
 use super::{RoundaboutParameters, Window};
 use crate::roadmap::Ring;
 
@@ -88,6 +87,18 @@ pub struct UserOnLane {
     pub on: OnLane,
 }
 
+impl UserOnLane {
+    /// If it is on a lane at all.
+    pub(super) fn of(user: &User<'_>) -> Option<Self> {
+        let likeliest = user.lanes.first();
+        let on = likeliest.filter(|on| on.place != Place::Elsewhere)?;
+        Some(Self {
+            object_id: user.object.id,
+            on: *on,
+        })
+    }
+}
+
 /// What is said of the nearest roundabout in a revolution.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Advice {
@@ -127,14 +138,14 @@ impl ArmAdvice {
 
     /// Whether the vehicle, as it goes, fits between those who come and those whom nobody sees.
     pub(super) fn of(
-        site: &Site,
+        asked: &Asked<'_>,
         bearing_rad: f64,
-        entry: &Entry,
         motion: &OwnMotion,
         comers: &[Window],
         unseen: Option<&Unseen>,
         parameters: &RoundaboutParameters,
     ) -> Self {
+        let &Asked { site, entry, .. } = asked;
         let mut advice = Self {
             bearing_rad,
             may_enter: true,

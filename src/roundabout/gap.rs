@@ -106,66 +106,45 @@ impl OwnMotion {
     }
 }
 
+/// Whose windows are asked about, and when.
+pub(super) struct Asked<'a> {
+    pub(super) site: &'a Site,
+    /// Number of the arm.
+    pub(super) arm: usize,
+    /// Its way in.
+    pub(super) entry: &'a Entry,
+    pub(super) now: Time,
+    /// As fast as anybody comes on the road.
+    pub(super) road_mps: f64,
+}
+
 /// The windows of a road user at the conflict points of a way in.
-pub(super) fn windows(
-    site: &Site,
-    arm: usize,
-    entry: &Entry,
-    user: &User<'_>,
-    now: Time,
-    road_mps: f64,
-    found: &mut Vec<Window>,
-) {
-    for (number, conflict) in entry.conflicts.iter().enumerate() {
-        let ways = user.lanes.iter().filter_map(|on| {
-            // Who crosses a pavement may go either way along it.
-            let speed_mps = user.object.speed_mps.abs();
-            let is_across =
-                conflict.kind == LaneKind::Pavement && on.speed_mps.abs() < ALONG_SHARE * speed_mps;
-            let (way_m, probability) = way_to(site, arm, conflict, on, is_across)?;
-            let speeds_mps = if is_across {
-                [speed_mps; 2]
-            } else {
-                [on.speed_mps.abs(), on.mean_speed_mps.abs()]
-            };
-            let on_circle = matches!(on.place, Place::Ring(_)) && conflict.kind == LaneKind::Road;
-            Some((way_m, speeds_mps, on_circle, probability * on.probability))
-        });
+pub(super) fn windows(asked: &Asked<'_>, user: &User<'_>, found: &mut Vec<Window>) {
+    for (number, conflict) in asked.entry.conflicts.iter().enumerate() {
         let mut best: Option<Window> = None;
-        for (way_m, speeds_mps, on_circle, probability) in ways {
-            let approach = Approach {
-                way_m,
-                speeds_mps,
-                zone_m: entry.width_m / 2.0,
-                fastest_mps: fastest_mps(conflict.kind, road_mps),
-                on_circle,
-                is_new: (now - user.object.first_seen).seconds() < NEW_S,
-            };
-            let Some(window) = window(user.object, &approach) else {
+        for on in user.lanes {
+            let approach = Approach::of(asked, conflict, user.object, on);
+            let Some(window) = approach.and_then(|approach| approach.window(user.object)) else {
                 continue;
-            };
-            let window = Window {
-                arm,
-                conflict: number,
-                kind: conflict.kind,
-                ..window
             };
             best = Some(match best {
                 // Lanes that lead to the same point: as early as by any, as probable as by all.
                 Some(known) => Window {
                     begin_s: known.begin_s.min(window.begin_s),
                     end_s: known.end_s.max(window.end_s),
-                    probability: known.probability + probability,
+                    probability: known.probability + window.probability,
                     ..known
                 },
-                None => Window {
-                    probability,
-                    ..window
-                },
+                None => window,
             });
         }
-        found.extend(best.filter(|window| {
-            window.probability >= LEAST_PROBABILITY && window.begin_s < HORIZON_S
+        let counts =
+            |window: &Window| window.probability >= LEAST_PROBABILITY && window.begin_s < HORIZON_S;
+        found.extend(best.filter(counts).map(|window| Window {
+            arm: asked.arm,
+            conflict: number,
+            kind: conflict.kind,
+            ..window
         }));
     }
 }
@@ -179,10 +158,8 @@ fn way_to(
     on: &OnLane,
     either_way: bool,
 ) -> Option<(f64, f64)> {
-    let ring = &site.rings[conflict.ring];
-    let radius_m = ring.circle.radius_m;
     // Behind the point by less than this is behind it, and not almost all the way round.
-    let behind = |way_m: f64| {
+    let behind = |way_m: f64, radius_m: f64| {
         const BEHIND_M: f64 = 12.0;
         if way_m > TAU * radius_m - BEHIND_M {
             way_m - TAU * radius_m
@@ -202,10 +179,11 @@ fn way_to(
             } else {
                 site.round_rad(angle_rad, conflict.angle_rad)
             };
+            let radius_m = own.circle.radius_m;
             let way_m = if either_way {
-                own.circle.radius_m * round_rad.min(TAU - round_rad)
+                radius_m * round_rad.min(TAU - round_rad)
             } else {
-                behind(own.circle.radius_m * round_rad)
+                behind(radius_m * round_rad, radius_m)
             };
             let exits = if own.kind == LaneKind::Road && way_m > 0.0 {
                 exits_between(site, angle_rad, round_rad)
@@ -219,6 +197,7 @@ fn way_to(
             let met_rad = site.angle_rad(way.at(way.length_m()).0);
             let round_rad = site.round_rad(met_rad, conflict.angle_rad);
             let exits = exits_between(site, met_rad, round_rad);
+            let radius_m = site.rings[conflict.ring].circle.radius_m;
             let way_m = way.length_m() - on.along_m + radius_m * round_rad;
             Some((way_m, libm::pow(STAYS, f64::from(exits))))
         }
@@ -247,71 +226,88 @@ struct Approach {
     on_circle: bool,
     /// Whether he has only just been seen.
     is_new: bool,
+    /// That he comes so.
+    probability: f64,
 }
 
-/// The window of somebody who comes so.
-fn window(object: &Object, approach: &Approach) -> Option<Window> {
-    let &Approach {
-        way_m,
-        speeds_mps: [now_mps, mean_mps],
-        zone_m,
-        fastest_mps,
-        on_circle,
-        is_new,
-    } = approach;
-    let [x, y] = object.position_deviation_m;
-    let half_m = object.length_m / 2.0 + zone_m;
-    let (front_m, rear_m) = (way_m - half_m, way_m + half_m);
-    let [slow_mps, fast_mps] = [now_mps.min(mean_mps), now_mps.max(mean_mps)];
-    let blank = Window {
-        object_id: object.id,
-        arm: 0,
-        conflict: 0,
-        kind: LaneKind::Road,
-        begin_s: 0.0,
-        end_s: 0.0,
-        expected_s: 0.0,
-        probability: 0.0,
-        way_m,
-    };
-    if fast_mps + 2.0 * object.speed_deviation_mps < WAITS_MPS && !is_new {
-        // Who stands where the ways cross is in the way as long as he stands.
-        let is_there = front_m <= 0.0 && rear_m >= 0.0;
-        let end_s = HORIZON_S;
-        return is_there.then_some(Window { end_s, ..blank });
+impl Approach {
+    /// Of somebody who may be on a lane, if it leads there.
+    fn of(asked: &Asked<'_>, conflict: &Conflict, object: &Object, on: &OnLane) -> Option<Self> {
+        // Who crosses a pavement may go either way along it.
+        let speed_mps = object.speed_mps.abs();
+        let is_across =
+            conflict.kind == LaneKind::Pavement && on.speed_mps.abs() < ALONG_SHARE * speed_mps;
+        let (way_m, probability) = way_to(asked.site, asked.arm, conflict, on, is_across)?;
+        Some(Self {
+            way_m,
+            speeds_mps: if is_across {
+                [speed_mps; 2]
+            } else {
+                [on.speed_mps.abs(), on.mean_speed_mps.abs()]
+            },
+            zone_m: asked.entry.width_m / 2.0,
+            fastest_mps: fastest_mps(conflict.kind, asked.road_mps),
+            on_circle: matches!(on.place, Place::Ring(_)) && conflict.kind == LaneKind::Road,
+            is_new: (asked.now - object.first_seen).seconds() < NEW_S,
+            probability: probability * on.probability,
+        })
     }
-    // How far off the time is by then: it is not known where he is, and not how fast.
-    let at_s = |way_m: f64, speed_mps: f64, side: f64| {
-        let moving_mps = speed_mps.max(WAITS_MPS);
-        let wander_m = way_m.max(0.0) / moving_mps * object.speed_deviation_mps;
-        let blur_m = libm::hypot(x.max(y).min(MOST_BLUR_M), wander_m);
-        (way_m + side * blur_m) / moving_mps
-    };
-    let deviations = if object.measured {
-        DEVIATIONS
-    } else {
-        DEVIATIONS_HIDDEN
-    };
-    let begin_s = at_s(front_m, fast_mps, -deviations).max(0.0);
-    // Who stands on the circle may go on.
-    let starts_s = libm::sqrt(2.0 * front_m.max(0.0) / STARTS_MPS2);
-    let begin_s = if on_circle && fast_mps < SLOW_MPS {
-        begin_s.min(starts_s)
-    } else {
+
+    /// When he is at the point.
+    fn window(&self, object: &Object) -> Option<Window> {
+        let [now_mps, mean_mps] = self.speeds_mps;
+        let [slow_mps, fast_mps] = [now_mps.min(mean_mps), now_mps.max(mean_mps)];
+        let half_m = object.length_m / 2.0 + self.zone_m;
+        let (front_m, rear_m) = (self.way_m - half_m, self.way_m + half_m);
+        let stands = fast_mps + 2.0 * object.speed_deviation_mps < WAITS_MPS && !self.is_new;
+        let [begin_s, end_s] = if stands {
+            // Who stands where the ways cross is in the way as long as he stands.
+            let is_there = front_m <= 0.0 && rear_m >= 0.0;
+            is_there.then_some([0.0, HORIZON_S])?
+        } else {
+            let end_s = time_s(object, rear_m, slow_mps, DEVIATIONS_BEHIND);
+            [self.begin_s(object, front_m, fast_mps), end_s]
+        };
+        let front_of_him_m = self.way_m - object.length_m / 2.0;
+        (end_s > 0.0).then_some(Window {
+            object_id: object.id,
+            arm: 0,
+            conflict: 0,
+            kind: LaneKind::Road,
+            begin_s,
+            end_s,
+            expected_s: time_s(object, front_of_him_m, now_mps, 0.0).max(0.0),
+            probability: self.probability,
+            way_m: self.way_m,
+        })
+    }
+
+    /// As early as he may come.
+    fn begin_s(&self, object: &Object, front_m: f64, fast_mps: f64) -> f64 {
+        let deviations = if object.measured {
+            DEVIATIONS
+        } else {
+            DEVIATIONS_HIDDEN
+        };
+        let mut begin_s = time_s(object, front_m, fast_mps, -deviations).max(0.0);
+        let left_m = front_m.max(0.0);
+        // Who stands on the circle may go on.
+        if self.on_circle && fast_mps < SLOW_MPS {
+            begin_s = begin_s.min(libm::sqrt(2.0 * left_m / STARTS_MPS2));
+        }
+        // Nobody knows yet how fast he is, or which way he goes.
+        if self.is_new {
+            begin_s = begin_s.min(left_m / self.fastest_mps);
+        }
         begin_s
-    };
-    // Nobody knows yet how fast he is, or which way he goes.
-    let begin_s = if is_new {
-        begin_s.min(front_m.max(0.0) / fastest_mps)
-    } else {
-        begin_s
-    };
-    let end_s = at_s(rear_m, slow_mps, DEVIATIONS_BEHIND);
-    let expected_s = at_s(way_m - object.length_m / 2.0, now_mps, 0.0).max(0.0);
-    (end_s > 0.0).then_some(Window {
-        begin_s,
-        end_s,
-        expected_s,
-        ..blank
-    })
+    }
+}
+
+/// When somebody has gone so far, so many deviations later: it is not known where he is, and not how fast.
+fn time_s(object: &Object, way_m: f64, speed_mps: f64, deviations: f64) -> f64 {
+    let [x, y] = object.position_deviation_m;
+    let moving_mps = speed_mps.max(WAITS_MPS);
+    let wander_m = way_m.max(0.0) / moving_mps * object.speed_deviation_mps;
+    let blur_m = libm::hypot(x.max(y).min(MOST_BLUR_M), wander_m);
+    (way_m + deviations * blur_m) / moving_mps
 }

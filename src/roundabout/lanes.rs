@@ -100,42 +100,11 @@ impl Belief {
         passed_s: f64,
         found: &mut Vec<OnLane>,
     ) {
-        let mut candidates = vec![Candidate {
-            on: OnLane {
-                place: Place::Elsewhere,
-                probability: 0.0,
-                along_m: 0.0,
-                offset_m: 0.0,
-                speed_mps: object.speed_mps,
-                mean_speed_mps: object.speed_mps,
-            },
-            likelihood: ELSEWHERE,
-        }];
-        candidates.extend((0..site.rings.len()).filter_map(|ring| on_ring(site, ring, object)));
-        for (arm, ways) in site.arms.iter().enumerate() {
-            let entries = ways.entries.iter().map(|entry| (&entry.way, entry.width_m));
-            let entries = (0..)
-                .zip(entries)
-                .map(|(lane, way)| (Place::Entry(arm, lane), way));
-            let exits = ways.exits.iter().map(|exit| (&exit.way, exit.width_m));
-            let exits = (0..)
-                .zip(exits)
-                .map(|(lane, way)| (Place::Exit(arm, lane), way));
-            candidates.extend(
-                entries
-                    .chain(exits)
-                    .filter_map(|(place, (way, width_m))| on_way(place, way, width_m, object)),
-            );
-        }
+        let candidates = candidates(site, object);
         let (_, speed_mps) = course(object);
         let mean_mps = self.mean_speed_mps.unwrap_or(speed_mps);
         let mean_mps = mean_mps + MEAN_SHARE * (speed_mps - mean_mps);
         self.mean_speed_mps = Some(mean_mps);
-        let steadied = if speed_mps > 0.0 {
-            mean_mps / speed_mps
-        } else {
-            1.0
-        };
         let gone_m = speed_mps * passed_s;
         let weights: Vec<f64> = candidates
             .iter()
@@ -152,7 +121,11 @@ impl Belief {
             if probability >= LEAST_PROBABILITY {
                 found.push(OnLane {
                     probability,
-                    mean_speed_mps: steadied * candidate.on.speed_mps,
+                    mean_speed_mps: if speed_mps > 0.0 {
+                        mean_mps / speed_mps * candidate.on.speed_mps
+                    } else {
+                        mean_mps
+                    },
                     ..candidate.on
                 });
             }
@@ -182,6 +155,33 @@ impl Belief {
         // Who leaves does so somewhere along the mouth.
         stayed + (1.0 - STAYS) * round * (gone_m / MOUTH_M).clamp(0.0, 1.0)
     }
+}
+
+/// The lanes that are near, and none of them.
+fn candidates(site: &Site, object: &Object) -> Vec<Candidate> {
+    let mut found = vec![Candidate {
+        on: OnLane {
+            place: Place::Elsewhere,
+            probability: 0.0,
+            along_m: 0.0,
+            offset_m: 0.0,
+            speed_mps: object.speed_mps,
+            mean_speed_mps: 0.0,
+        },
+        likelihood: ELSEWHERE,
+    }];
+    found.extend((0..site.rings.len()).filter_map(|ring| on_ring(site, ring, object)));
+    for (arm, ways) in site.arms.iter().enumerate() {
+        for (lane, entry) in ways.entries.iter().enumerate() {
+            let place = Place::Entry(arm, lane);
+            found.extend(on_way(place, &entry.way, entry.width_m, object));
+        }
+        for (lane, exit) in ways.exits.iter().enumerate() {
+            let place = Place::Exit(arm, lane);
+            found.extend(on_way(place, &exit.way, exit.width_m, object));
+        }
+    }
+    found
 }
 
 /// Direction of motion: a box that goes backwards moves against its yaw.

@@ -19,7 +19,7 @@ use crate::parameter::{Text, parameters};
 use crate::roadmap::{Origin, Roadmap, Roundabout, roundabouts, simplified};
 use crate::time::Time;
 use crate::track::Object;
-use gap::User;
+use gap::{Asked, User};
 use lanes::Belief;
 use own::{Own, standing};
 use sight::Unseen;
@@ -231,59 +231,58 @@ impl Watcher {
             .zip(&self.lanes)
             .map(|(object, lanes)| User { object, lanes })
             .collect();
-        for user in &users {
-            let likeliest = user.lanes.first().filter(|on| on.place != Place::Elsewhere);
-            advice.users.extend(likeliest.map(|&on| UserOnLane {
-                object_id: user.object.id,
-                on,
-            }));
-        }
-        let watched_s = self
-            .since
-            .map_or(0.0, |since| (situation.time - since).seconds());
-        let is_fresh = watched_s < FIRST_LOOK_S;
-        for (number, arm) in site.arms.iter().enumerate() {
-            let is_own = own.arm == Some(number);
-            let lane = if is_own { own.lane } else { 0 };
-            let Some(entry) = arm.entries.get(lane) else {
-                advice.arms.push(ArmAdvice::closed(arm.bearing_rad));
-                continue;
-            };
-            let motion = own
-                .motion
-                .filter(|_| is_own)
-                .unwrap_or_else(|| standing(site, entry, self.parameters.own_length_m));
-            let first = advice.windows.len();
-            for user in &users {
-                let road_mps = self.parameters.speed_mps;
-                gap::windows(
-                    site,
-                    number,
-                    entry,
-                    user,
-                    situation.time,
-                    road_mps,
-                    &mut advice.windows,
-                );
-            }
-            let comers = &advice.windows[first..];
-            let unseen = situation.sight.map(|_| &self.unseen);
-            let mut arm = ArmAdvice::of(
-                site,
-                arm.bearing_rad,
-                entry,
-                &motion,
-                comers,
-                unseen,
-                &self.parameters,
-            );
-            if is_fresh && situation.sight.is_some() {
-                arm.may_enter = false;
-                arm.hindrance = arm.hindrance.or(Some(Hindrance::Unseen));
-            }
+        advice.users.extend(users.iter().filter_map(UserOnLane::of));
+        for number in 0..site.arms.len() {
+            let arm = self.arm(site, number, &own, &users, situation, &mut advice.windows);
             advice.arms.push(arm);
         }
         self.advice = advice;
+    }
+
+    /// What is said of an arm; the windows of those who come to it are added to the others.
+    fn arm(
+        &self,
+        site: &Site,
+        number: usize,
+        own: &Own,
+        users: &[User<'_>],
+        situation: &Situation<'_>,
+        windows: &mut Vec<Window>,
+    ) -> ArmAdvice {
+        let arm = &site.arms[number];
+        let own = Some(own).filter(|own| own.arm == Some(number));
+        let Some(entry) = arm.entries.get(own.map_or(0, |own| own.lane)) else {
+            return ArmAdvice::closed(arm.bearing_rad);
+        };
+        let waits = || standing(site, entry, self.parameters.own_length_m);
+        let motion = own.and_then(|own| own.motion).unwrap_or_else(waits);
+        let asked = Asked {
+            site,
+            arm: number,
+            entry,
+            now: situation.time,
+            road_mps: self.parameters.speed_mps,
+        };
+        let first = windows.len();
+        users
+            .iter()
+            .for_each(|user| gap::windows(&asked, user, windows));
+        let unseen = situation.sight.map(|_| &self.unseen);
+        let mut advice = ArmAdvice::of(
+            &asked,
+            arm.bearing_rad,
+            &motion,
+            &windows[first..],
+            unseen,
+            &self.parameters,
+        );
+        let since = self.since.unwrap_or(situation.time);
+        let is_fresh = (situation.time - since).seconds() < FIRST_LOOK_S;
+        if is_fresh && situation.sight.is_some() {
+            advice.may_enter = false;
+            advice.hindrance = advice.hindrance.or(Some(Hindrance::Unseen));
+        }
+        advice
     }
 }
 

@@ -72,35 +72,24 @@ impl Own {
             let turned_rad = wrapped_rad(pose.yaw_rad - station.heading_rad);
             (station.distance_m < ASIDE_M && turned_rad.abs() < TURNED_RAD).then_some(station)
         };
+        let speed_mps = situation.vehicle_speed_mps.max(0.0);
         for (arm, ways) in site.arms.iter().enumerate() {
             for (lane, entry) in ways.entries.iter().enumerate() {
                 let Some(station) = is_on(&entry.way) else {
                     continue;
                 };
-                let from_m = station.along_m + parameters.own_front_m;
-                if from_m > entry.way.length_m() + parameters.own_length_m {
-                    continue;
-                }
                 let motion = OwnMotion {
-                    front_m: from_m,
-                    speed_mps: situation.vehicle_speed_mps.max(0.0),
+                    front_m: station.along_m + parameters.own_front_m,
+                    speed_mps,
                 };
-                let stop_m = standing(site, entry, parameters.own_length_m).front_m - from_m;
-                let brakes_m =
-                    motion.speed_mps * motion.speed_mps / (2.0 * parameters.deceleration_mps2);
-                // A second of way is left to begin with it.
-                let must_brake = stop_m < brakes_m + motion.speed_mps + STOP_M;
-                let state = if must_brake {
-                    State::Braking
-                } else {
-                    State::Approaching
-                };
-                return Self {
-                    state,
-                    arm: Some(arm),
-                    lane,
-                    motion: Some(motion),
-                };
+                if motion.front_m < entry.way.length_m() + parameters.own_length_m {
+                    return Self {
+                        state: motion.state(site, entry, parameters),
+                        arm: Some(arm),
+                        lane,
+                        motion: Some(motion),
+                    };
+                }
             }
         }
         let out_m = libm::hypot(front_m[0] - site.centre_m[0], front_m[1] - site.centre_m[1]);
@@ -120,5 +109,19 @@ impl Own {
             }
         }
         Self::WATCHING
+    }
+}
+
+impl OwnMotion {
+    /// Whether it is time to brake.
+    fn state(&self, site: &Site, entry: &Entry, parameters: &RoundaboutParameters) -> State {
+        let stop_m = standing(site, entry, parameters.own_length_m).front_m - self.front_m;
+        let brakes_m = self.speed_mps * self.speed_mps / (2.0 * parameters.deceleration_mps2);
+        // A second of way is left to begin with it.
+        if stop_m < brakes_m + self.speed_mps + STOP_M {
+            State::Braking
+        } else {
+            State::Approaching
+        }
     }
 }

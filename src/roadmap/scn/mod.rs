@@ -30,6 +30,7 @@
 
 mod lines;
 mod read;
+mod values;
 mod write;
 
 pub use read::read;

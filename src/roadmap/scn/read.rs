@@ -1,15 +1,12 @@
 //! Reading scenarios.
 
 use super::lines::{Line, Lines};
+use super::values::{connector, interval, junction, kind, length, number, whole};
 use crate::ego::geodesy::Geodetic;
 use crate::roadmap::curve::Vertex;
 use crate::roadmap::{
-    Connector, Curve, DeclaredCircle, DeclaredRoundabout, Junction, Lane, LaneId, LaneKind,
-    MapError, Origin, PointId, Roadmap,
+    Curve, DeclaredCircle, DeclaredRoundabout, Lane, LaneId, LaneKind, MapError, Origin, Roadmap,
 };
-
-/// Farther from its origin no map has a place; nor a radius or width.
-const FARTHEST_M: f64 = 1e6;
 
 /// The roads of a scenario. What is no road is passed over and counted by name.
 ///
@@ -249,7 +246,7 @@ impl<'a> Reader<'a> {
                 return Err(line.error(format!("{key} wanted, {} found", line.key)));
             }
             let value = number(&line)?;
-            if value.abs() > FARTHEST_M {
+            if value.abs() > super::values::FARTHEST_M {
                 return Err(line.rest_error(format!("{value} is out of any map")));
             }
             Ok((value, line))
@@ -377,94 +374,4 @@ fn origin([first, second]: [(f64, Line<'_>); 2], rotation_rad: f64) -> Read<Orig
 /// Whether a road is called a roundabout.
 fn is_roundabout_name(name: &str) -> bool {
     name.to_lowercase().contains("roundabout") || name.to_lowercase().contains("kreisverkehr")
-}
-
-fn number(line: &Line<'_>) -> Read<f64> {
-    let value: Result<f64, _> = line.rest.parse();
-    let finite = value.ok().filter(|value| value.is_finite());
-    finite.ok_or_else(|| line.rest_error(format!("{:?} is no number", shortened(line.rest))))
-}
-
-fn length(line: &Line<'_>) -> Read<f64> {
-    let value = number(line)?;
-    if (0.0..=FARTHEST_M).contains(&value) {
-        Ok(value)
-    } else {
-        Err(line.rest_error(format!("{} of {value}", line.key)))
-    }
-}
-
-fn whole(line: &Line<'_>) -> Read<u32> {
-    let problem = || line.rest_error(format!("{:?} is no whole number", shortened(line.rest)));
-    line.rest.parse().map_err(|_| problem())
-}
-
-fn kind(line: &Line<'_>) -> Read<LaneKind> {
-    LaneKind::of(line.rest).ok_or_else(|| {
-        line.rest_error(format!(
-            "{:?} is neither road nor bikeway nor pavement",
-            shortened(line.rest)
-        ))
-    })
-}
-
-/// As `[ 0 1.57 ]`.
-fn interval(line: &Line<'_>) -> Read<[f64; 2]> {
-    let problem = || line.rest_error("an interval is written [ from to ]");
-    let inner = line.rest.strip_prefix('[').ok_or_else(problem)?;
-    let inner = inner.trim_end().strip_suffix(']').ok_or_else(problem)?;
-    let mut parts = inner.split_whitespace().map(str::parse);
-    let mut next = || -> Read<f64> {
-        let value: f64 = parts.next().ok_or_else(problem)?.map_err(|_| problem())?;
-        Some(value)
-            .filter(|value| value.abs() < 1e3)
-            .ok_or_else(problem)
-    };
-    Ok([next()?, next()?])
-}
-
-/// As `(1.2.3.4) -> (1.5.6.7)`.
-fn connector(line: &Line<'_>) -> Read<Connector> {
-    let problem = || {
-        line.rest_error("a connector is written (layer.road.lane.point) -> (layer.road.lane.point)")
-    };
-    let (from, to) = line.rest.split_once("->").ok_or_else(problem)?;
-    Ok(Connector {
-        from: point_id(from).ok_or_else(problem)?,
-        to: point_id(to).ok_or_else(problem)?,
-    })
-}
-
-/// As `ENTRY (1.2.3.4) -> 1` or `EXIT 1 -> (1.2.3.4)`.
-fn junction(line: &Line<'_>) -> Read<Junction> {
-    let problem = || {
-        line.rest_error(
-            "a junction is written ENTRY (layer.road.lane.point) -> circle, or EXIT circle -> (...)",
-        )
-    };
-    let (from, to) = line.rest.split_once("->").ok_or_else(problem)?;
-    let is_entry = line.key == "ENTRY";
-    let (lane, circle) = if is_entry { (from, to) } else { (to, from) };
-    Ok(Junction {
-        lane: point_id(lane).ok_or_else(problem)?,
-        is_entry,
-        circle: circle.trim().parse().map_err(|_| problem())?,
-    })
-}
-
-fn point_id(text: &str) -> Option<PointId> {
-    let inner = text.trim().strip_prefix('(')?.strip_suffix(')')?;
-    let mut parts = inner.split('.').map(|part| part.trim().parse().ok());
-    let mut next = || parts.next().flatten();
-    let (layer, road, lane) = (next()?, next()?, next()?);
-    let point = next()?;
-    Some(PointId {
-        lane: LaneId { layer, road, lane },
-        point,
-    })
-}
-
-/// Enough of a value to recognise it.
-fn shortened(text: &str) -> String {
-    text.chars().take(40).collect()
 }

@@ -1,0 +1,151 @@
+//! Advice at a roundabout as `kreisel.Roundabout`.
+
+use crate::roadmap::Ring;
+use crate::roundabout::{Advice, ArmAdvice, Hindrance, Place, UserOnLane, Window};
+use crate::wire::message::List;
+use crate::wire::roundabout::{
+    ConflictWindow, LaneUser, Roundabout, RoundaboutArm, RoundaboutRing,
+};
+
+/// What a datagram has room for of a roundabout's lists, beside each other: more is no street.
+const MOST_ARMS: usize = 32;
+const MOST_WINDOWS: usize = 800;
+const MOST_USERS: usize = 256;
+const MOST_RINGS: usize = 16;
+const LONGEST_NAME: usize = 100;
+
+/// What is said in a revolution. Of more windows than a datagram has room for, the soonest are kept.
+pub(super) fn message(revolution: u32, advice: &Advice) -> Roundabout {
+    let mut soonest: Vec<&Window> = advice.windows.iter().collect();
+    if soonest.len() > MOST_WINDOWS {
+        soonest.sort_by(|a, b| a.begin_s.total_cmp(&b.begin_s));
+        soonest.truncate(MOST_WINDOWS);
+    }
+    let arms = advice.arms.iter().take(MOST_ARMS);
+    let users = advice.users.iter().filter_map(lane_user);
+    let rings = advice.rings.iter().take(MOST_RINGS);
+    Roundabout {
+        revolution,
+        name: advice.name.chars().take(LONGEST_NAME).collect(),
+        x: advice.centre_m[0],
+        y: advice.centre_m[1],
+        diameter: advice.diameter_m as f32,
+        state: advice.state.number(),
+        own_arm: advice.own_arm.map_or(-1, |arm| arm as i32),
+        arms: List(arms.map(arm_of).collect()),
+        windows: List(soonest.into_iter().map(conflict_window).collect()),
+        users: List(users.take(MOST_USERS).collect()),
+        rings: List(rings.map(ring_of).collect()),
+    }
+}
+
+fn arm_of(arm: &ArmAdvice) -> RoundaboutArm {
+    let (hindrance, hindering_object) = match arm.hindrance {
+        None => (0, 0),
+        Some(Hindrance::RoadUser(id)) => (1, id),
+        Some(Hindrance::Unseen) => (2, 0),
+        Some(Hindrance::NoEntry) => (3, 0),
+    };
+    RoundaboutArm {
+        bearing: arm.bearing_rad as f32,
+        may_enter: arm.may_enter,
+        hindrance,
+        hindering_object,
+        gap: arm.gap_s as f32,
+        own_begin: arm.own_window_s[0] as f32,
+        own_end: arm.own_window_s[1] as f32,
+        margin: arm.margin_s as f32,
+        seen_share: arm.seen_share as f32,
+    }
+}
+
+fn conflict_window(window: &Window) -> ConflictWindow {
+    ConflictWindow {
+        object_id: window.object_id,
+        arm: window.arm as u32,
+        kind: window.kind.number(),
+        begin: window.begin_s as f32,
+        end: window.end_s as f32,
+        expected: window.expected_s as f32,
+        probability: window.probability as f32,
+        way: window.way_m as f32,
+    }
+}
+
+fn lane_user(user: &UserOnLane) -> Option<LaneUser> {
+    let (lane_kind, number) = match user.on.place {
+        Place::Ring(number) => (0, number),
+        Place::Entry(arm, _) => (1, arm),
+        Place::Exit(arm, _) => (2, arm),
+        Place::Elsewhere => return None,
+    };
+    Some(LaneUser {
+        object_id: user.object_id,
+        lane_kind,
+        number: number as u32,
+        probability: user.on.probability as f32,
+        along: user.on.along_m as f32,
+        offset: user.on.offset_m as f32,
+    })
+}
+
+fn ring_of(ring: &Ring) -> RoundaboutRing {
+    RoundaboutRing {
+        kind: ring.kind.number(),
+        radius: ring.circle.radius_m as f32,
+        width: ring.width_m as f32,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::roundabout::OnLane;
+    use crate::wire::Message as _;
+    use crate::wire::frame::MAX_DATAGRAM_LEN;
+
+    #[test]
+    fn the_busiest_roundabout_fits_a_datagram() {
+        let window = Window {
+            object_id: u32::MAX,
+            arm: 1000,
+            conflict: 0,
+            kind: crate::roadmap::LaneKind::Pavement,
+            begin_s: 14.0,
+            end_s: 15.0,
+            expected_s: 14.5,
+            probability: 0.5,
+            way_m: 50.0,
+        };
+        let user = UserOnLane {
+            object_id: u32::MAX,
+            on: OnLane {
+                place: Place::Exit(1000, 0),
+                probability: 0.5,
+                along_m: 1.0,
+                offset_m: 1.0,
+                speed_mps: 1.0,
+                mean_speed_mps: 1.0,
+            },
+        };
+        let soon = Window {
+            begin_s: 0.0,
+            object_id: 1,
+            ..window
+        };
+        let windows = (0..5000).map(|_| window).chain([soon]);
+        let advice = Advice {
+            name: "x".repeat(1000),
+            windows: windows.collect(),
+            users: vec![user; 1000],
+            ..Advice::default()
+        };
+        /// Of an envelope.
+        const HEADER: usize = 100;
+        let said = message(9, &advice);
+        assert_eq!(said.windows.0[0].object_id, 1);
+        let mut bytes = vec![];
+        said.encode(&mut bytes);
+        assert!(bytes.len() + HEADER < MAX_DATAGRAM_LEN, "{}", bytes.len());
+    }
+}
