@@ -77,7 +77,7 @@ fn what_libcluon_replays_is_answered_and_libcluon_decodes_the_answer() {
         drop(player);
         std::thread::sleep(Duration::from_millis(300));
         let (_, json, _) = listener.stop();
-        assert!(json.contains("Parsed 4 message(s)."), "{json:.200}");
+        assert!(json.contains("Parsed 9 message(s)."), "{json:.200}");
         assert_eq!(
             json.matches("\"kreisel_ObjectList\":{\"revolution\":")
                 .count(),

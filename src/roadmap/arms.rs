@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::network::Network;
 use super::rings::OFF_CIRCLE_M;
-use super::roundabout::{Access, Arm, Roundabout};
+use super::roundabout::{Access, Arm, Ring, Roundabout};
 use super::{Lane, LaneId, Polyline};
 
 /// How far from the circle arms are followed.
@@ -22,16 +22,25 @@ pub(super) fn accesses(
     roundabout: &Roundabout,
 ) -> (Vec<Access>, Vec<Access>) {
     let (centre_m, outer_m) = (roundabout.centre_m(), roundabout.outer_m());
+    // Of a large map nearly all lanes are far away.
+    let reach_m = roundabout
+        .rings
+        .iter()
+        .map(Ring::outer_m)
+        .fold(outer_m, f64::max)
+        + MOUTH_M;
+    let is_near = |way: &Polyline| way.comes_within(centre_m, reach_m);
     let on_ring = |way: &Polyline| {
         let points_m = way.points_m();
         roundabout.rings.iter().any(|ring| {
             let on = |&&at_m: &&[f64; 2]| ring.circle.off_m(at_m).abs() < 2.0 * OFF_CIRCLE_M;
-            2 * points_m.iter().filter(on).count() > points_m.len()
+            // Much of it: a lane may begin or end with a piece of the road.
+            3 * points_m.iter().filter(on).count() > points_m.len()
         })
     };
     let lanes = || network.lanes.iter().zip(&network.ways);
     let rings = lanes()
-        .filter(|(_, way)| on_ring(way))
+        .filter(|(_, way)| is_near(way) && on_ring(way))
         .map(|(lane, _)| lane.id);
     let rings: BTreeSet<LaneId> = rings.collect();
     let into_ring: BTreeSet<LaneId> = network
@@ -56,12 +65,19 @@ pub(super) fn accesses(
         away_m < 0.0 || (away_m < MOUTH_M && ahead_m > 0.0 && beside_m.abs() < outer_m)
     };
     let (mut entries, mut exits) = (vec![], vec![]);
-    for (lane, way) in lanes().filter(|(lane, _)| !rings.contains(&lane.id)) {
-        if into_ring.contains(&lane.id) || meets(way, true) {
-            entries.push(access(lane, roundabout, true));
+    for (index, (lane, way)) in lanes().enumerate() {
+        if rings.contains(&lane.id)
+            || !(is_near(way) || into_ring.contains(&lane.id) || from_ring.contains(&lane.id))
+        {
+            continue;
         }
-        if from_ring.contains(&lane.id) || meets(way, false) {
-            exits.push(access(lane, roundabout, false));
+        // Who leads on elsewhere, or comes from elsewhere, does not begin or end here.
+        let (leads_on, comes_from) = (network.leads_on(lane.id), network.comes_from(lane.id));
+        if into_ring.contains(&lane.id) || (!leads_on && meets(way, true)) {
+            entries.push(access(lane, network.way_to(index), roundabout, true));
+        }
+        if from_ring.contains(&lane.id) || (!comes_from && meets(way, false)) {
+            exits.push(access(lane, network.way_from(index), roundabout, false));
         }
     }
     (entries, exits)
@@ -70,8 +86,13 @@ pub(super) fn accesses(
 /// Longest corner: from where a lane meets the circle outward, it has the arm's direction by then.
 const CORNER_M: f64 = 25.0;
 
-pub(super) fn access(lane: &Lane, roundabout: &Roundabout, is_entry: bool) -> Access {
-    let whole = lane.curve.polyline();
+/// `whole` is the way in or out, of which the lane is the last or first piece.
+pub(super) fn access(
+    lane: &Lane,
+    whole: Polyline,
+    roundabout: &Roundabout,
+    is_entry: bool,
+) -> Access {
     let length_m = whole.length_m();
     let way = if is_entry {
         whole.between((length_m - REACH_M).max(0.0), length_m)
@@ -110,7 +131,12 @@ pub(super) fn arms(entries: Vec<Access>, exits: Vec<Access>, is_clockwise: bool)
     };
     let mut mouths: Vec<_> = entries.into_iter().map(|access| (true, access)).collect();
     mouths.extend(exits.into_iter().map(|access| (false, access)));
-    mouths.sort_by(|(_, a), (_, b)| round_rad(a.bearing_rad).total_cmp(&round_rad(b.bearing_rad)));
+    // Where both are one, as on a road that parts, the exit comes first.
+    let place = |(is_entry, access): &(bool, Access)| {
+        let rounded = libm::round(round_rad(access.bearing_rad) * 1e3) as i64;
+        (rounded, *is_entry)
+    };
+    mouths.sort_by_key(place);
     // Begin behind the widest gap.
     let count = mouths.len();
     let gap_before = |index: usize| {
@@ -124,9 +150,18 @@ pub(super) fn arms(entries: Vec<Access>, exits: Vec<Access>, is_clockwise: bool)
     let mut last_rad = 0.0;
     for (is_entry, access) in mouths {
         let step_rad = round_rad(access.bearing_rad - last_rad);
+        // Rounding may have put two that are one in the other order.
+        let step_rad = if step_rad > TAU - 0.01 { 0.0 } else { step_rad };
         last_rad = access.bearing_rad;
         let joins = found.last().is_some_and(|arm| {
-            step_rad < ARM_RAD && (is_entry || (arm.entries.is_empty() && step_rad < ARM_RAD / 2.0))
+            let home = if is_entry { &arm.entries } else { &arm.exits };
+            let is_in_order = is_entry || arm.entries.is_empty();
+            let most_rad = if home.is_empty() {
+                ARM_RAD
+            } else {
+                ARM_RAD / 4.0
+            };
+            is_in_order && step_rad < most_rad
         });
         if !joins {
             found.push(Arm::default());

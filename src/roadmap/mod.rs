@@ -191,6 +191,8 @@ pub struct DeclaredRoundabout {
     pub name: String,
     /// Of all circles.
     pub centre_m: [f64; 2],
+    /// Whether one drives round clockwise, if the map says so.
+    pub is_clockwise: Option<bool>,
     /// From the inside out.
     pub circles: Vec<DeclaredCircle>,
     /// Lanes that lead in or out.

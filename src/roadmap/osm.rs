@@ -13,6 +13,7 @@ use super::{
     Connector, Curve, Lane, LaneId, LaneKind, MapError, Origin, PointId, Polyline, Roadmap,
 };
 use crate::ego::geodesy::{Geodetic, LocalFrame};
+use crate::ego::wrapped_rad;
 
 /// The roads of an extract, in metres around the middle of all their nodes, or around `origin`.
 ///
@@ -43,6 +44,7 @@ pub fn read(text: &str, origin: Option<Geodetic>) -> Result<Roadmap, MapError> {
         },
         nodes,
         frame: None,
+        side: 1.0,
         places: BTreeMap::new(),
     };
     let ways: Vec<_> = root
@@ -50,6 +52,7 @@ pub fn read(text: &str, origin: Option<Geodetic>) -> Result<Roadmap, MapError> {
         .filter(|node| node.has_tag_name("way"))
         .collect();
     reader.begin(&ways, origin);
+    reader.take_side(&ways);
     for way in &ways {
         reader.way(way);
     }
@@ -98,6 +101,8 @@ struct Reader<'a> {
     map: Roadmap,
     nodes: BTreeMap<&'a str, Geodetic>,
     frame: Option<LocalFrame>,
+    /// 1 where traffic drives on the right, else -1.
+    side: f64,
     /// Where lanes have a point at a node, by the node.
     places: BTreeMap<&'a str, Vec<PointId>>,
 }
@@ -218,6 +223,26 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// Roundabouts are driven clockwise where traffic drives on the left.
+    fn take_side(&mut self, ways: &[Node<'a, '_>]) {
+        let circular = ways.iter().filter(|way| {
+            Lanes::of(way).is_some_and(|lanes| lanes.is_circular && lanes.backward == 0)
+        });
+        let turned_rad: f64 = circular.map(|way| turned_rad(&self.known(way))).sum();
+        self.side = if turned_rad < 0.0 { -1.0 } else { 1.0 };
+    }
+
+    /// A way's nodes that are in the file, with their places.
+    fn known(&self, way: &Node<'a, '_>) -> Vec<(&'a str, [f64; 2])> {
+        let references = way.children().filter_map(|node| node.attribute("ref"));
+        references
+            .filter_map(|id| {
+                let [x, y, _] = self.frame.as_ref()?.local_m(*self.nodes.get(id)?);
+                Some((id, [x, y]))
+            })
+            .collect()
+    }
+
     fn way(&mut self, way: &Node<'a, '_>) {
         let Some(lanes) = Lanes::of(way) else {
             let what = if tag(way, "highway").is_some() {
@@ -228,14 +253,7 @@ impl<'a> Reader<'a> {
             self.skip(what);
             return;
         };
-        let known: Vec<_> = way
-            .children()
-            .filter_map(|node| node.attribute("ref"))
-            .filter_map(|id| {
-                let [x, y, _] = self.frame.as_ref()?.local_m(*self.nodes.get(id)?);
-                Some((id, [x, y]))
-            })
-            .collect();
+        let known = self.known(way);
         let middle = Polyline::through(known.iter().map(|(_, place_m)| *place_m));
         if middle.points_m().len() < 2 {
             // Extracts are cut through roads.
@@ -246,9 +264,9 @@ impl<'a> Reader<'a> {
         let width_m = lanes.width_m.unwrap_or(lanes.kind.usual_width_m());
         let total = lanes.forward + lanes.backward;
         for index in 0..total {
-            // From the right edge leftward: those that go forward come first.
+            // From the edge that one drives along inward: those that go forward come first.
             let is_forward = index < lanes.forward;
-            let left_m = (index as f64 + 0.5 - total as f64 / 2.0) * width_m;
+            let left_m = self.side * (index as f64 + 0.5 - total as f64 / 2.0) * width_m;
             let shifted = shifted(&known, left_m);
             let id = LaneId {
                 layer: 1,
@@ -308,7 +326,7 @@ impl<'a> Reader<'a> {
         };
         let mut connectors = vec![];
         /// More is no crossing.
-        const MOST_LANES: usize = 64;
+        const MOST_LANES: usize = 24;
         let crossings = self.places.values();
         for points in crossings.filter(|points| (2..=MOST_LANES).contains(&points.len())) {
             let ends: Vec<_> = points
@@ -330,6 +348,17 @@ impl<'a> Reader<'a> {
         }
         self.map.connectors = connectors;
     }
+}
+
+/// How far a chain of places turns to the left.
+fn turned_rad(known: &[(&str, [f64; 2])]) -> f64 {
+    let steps = known.windows(2).map(|pair| {
+        let [(_, [ax, ay]), (_, [bx, by])] = [pair[0], pair[1]];
+        libm::atan2(by - ay, bx - ax)
+    });
+    let headings_rad: Vec<f64> = steps.collect();
+    let turns = headings_rad.windows(2);
+    turns.map(|pair| wrapped_rad(pair[1] - pair[0])).sum()
 }
 
 /// The way beside its middle line, with every node's name.

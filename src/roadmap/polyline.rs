@@ -6,6 +6,8 @@ pub struct Polyline {
     points_m: Vec<[f64; 2]>,
     /// Way from the first point to each.
     along_m: Vec<f64>,
+    /// Lowest and highest coordinates.
+    extent_m: [[f64; 2]; 2],
 }
 
 /// The place of a polyline that is nearest to a point.
@@ -28,8 +30,16 @@ pub(super) const SAME_POINT_M: f64 = 1e-3;
 impl Polyline {
     /// Through these points; repeated ones are left out.
     pub fn through(points_m: impl IntoIterator<Item = [f64; 2]>) -> Self {
-        let mut way = Self::default();
+        let mut way = Self {
+            extent_m: [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]],
+            ..Self::default()
+        };
         for point_m in points_m {
+            let [low_m, high_m] = way.extent_m;
+            way.extent_m = [
+                [low_m[0].min(point_m[0]), low_m[1].min(point_m[1])],
+                [high_m[0].max(point_m[0]), high_m[1].max(point_m[1])],
+            ];
             let Some(&last_m) = way.points_m.last() else {
                 way.points_m.push(point_m);
                 way.along_m.push(0.0);
@@ -42,6 +52,12 @@ impl Polyline {
             }
         }
         way
+    }
+
+    /// Whether the box around it comes so near to a place.
+    pub(super) fn comes_within(&self, at_m: [f64; 2], reach_m: f64) -> bool {
+        let [low_m, high_m] = self.extent_m;
+        (0..2).all(|axis| low_m[axis] - reach_m < at_m[axis] && at_m[axis] < high_m[axis] + reach_m)
     }
 
     /// Its points.

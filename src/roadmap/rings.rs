@@ -74,8 +74,11 @@ fn grouped(network: &Network<'_>, bends: Vec<Bend>) -> Vec<Group> {
         };
         let group = &mut groups[index];
         group.bends.push(bend);
-        let points_m: Vec<_> = group.points_m().collect();
-        group.circle = Circle::fit(&points_m).unwrap_or(group.circle);
+        // As often as it doubles: more pieces tell little more.
+        if group.bends.len().is_power_of_two() {
+            let points_m: Vec<_> = group.points_m().collect();
+            group.circle = Circle::fit(&points_m).unwrap_or(group.circle);
+        }
     }
     groups
 }
@@ -179,7 +182,11 @@ pub(super) fn named(network: &Network<'_>) -> Vec<Roundabout> {
     for lanes in network.circular() {
         // A lane runs on one ring only.
         let mut taken: BTreeSet<usize> = BTreeSet::new();
-        for bend in bends_of(network, lanes.iter().copied()) {
+        let mut bends = bends_of(network, lanes.iter().copied());
+        if bends.is_empty() {
+            bends.extend(whole(network, &lanes));
+        }
+        for bend in bends {
             if taken.contains(&bend.lane) {
                 continue;
             }
@@ -199,6 +206,25 @@ pub(super) fn named(network: &Network<'_>) -> Vec<Roundabout> {
         }
     }
     found
+}
+
+/// The circle through all points of lanes that are too short to have bends of their own, as where a map parts its circle at
+/// each arm.
+fn whole(network: &Network<'_>, lanes: &BTreeSet<usize>) -> Option<Bend> {
+    let &lane = lanes.first()?;
+    let ways = lanes.iter().map(|&lane| network.ways[lane].points_m());
+    let points_m: Vec<[f64; 2]> = ways.flatten().copied().collect();
+    let circle = Circle::fit(&points_m)?;
+    let turns = lanes
+        .iter()
+        .map(|&lane| sweep_rad(&circle, network.ways[lane].points_m()));
+    Some(Bend {
+        lane,
+        sweep_rad: turns.sum(),
+        points_m,
+        circle,
+    })
+    .filter(|bend| RADII_M.contains(&bend.circle.radius_m))
 }
 
 /// Twice what a bend's points may be off: the circle is of several lanes, each drawn by hand.

@@ -150,6 +150,7 @@ impl Roundabout {
             id,
             name: self.name.clone(),
             centre_m: self.centre_m(),
+            is_clockwise: Some(self.is_clockwise),
             circles: circles.collect(),
             junctions: junctions.collect(),
         })

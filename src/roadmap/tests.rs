@@ -145,6 +145,7 @@ fn two_rings_are_two_lanes_and_with_a_line_between_them_large() {
         id: 1,
         name: "Two".to_owned(),
         centre_m: [5.0, 5.0],
+        is_clockwise: None,
         circles: (1u32..)
             .zip(circles)
             .map(|(id, (inner_m, outer_m, kind))| DeclaredCircle {
@@ -336,4 +337,107 @@ fn a_mirrored_map_is_driven_clockwise() {
         (Source::Declared, true)
     );
     assert_eq!(declared[0].arms.len(), 1);
+}
+
+/// An extract with a circle of 24 nodes, driven clockwise where traffic drives on the left, parted into ways, and four
+/// two-way roads of two pieces each.
+fn town(pieces: usize, side: f64) -> String {
+    const NODES: usize = 24;
+    let node = |id: usize, radius_m: f64, angle_rad: f64| {
+        let (sine, cosine) = angle_rad.sin_cos();
+        let (lat, lon) = (
+            radius_m * sine / 111_320.0,
+            side * radius_m * cosine / 111_320.0,
+        );
+        format!("<node id='{id}' lat='{lat:.9}' lon='{lon:.9}'/>")
+    };
+    let turn = |share: f64| TAU * share;
+    let mut text = String::from("<osm>");
+    for id in 0..NODES {
+        text += &node(id, 13.0, turn(id as f64 / NODES as f64));
+    }
+    for arm in 0..4 {
+        text += &node(100 + arm, 30.0, turn(arm as f64 / 4.0));
+        text += &node(200 + arm, 90.0, turn(arm as f64 / 4.0));
+    }
+    let mut ids = 0..;
+    let mut way = |nodes: &[usize], tags: &str| {
+        let id = ids.next().unwrap();
+        let nodes: String = nodes.iter().map(|id| format!("<nd ref='{id}'/>")).collect();
+        text += &format!("<way id='{id}'>{nodes}<tag k='highway' v='residential'/>{tags}</way>");
+    };
+    let each = NODES / pieces;
+    for piece in 0..pieces {
+        let nodes: Vec<_> = (piece * each..=(piece + 1) * each)
+            .map(|id| id % NODES)
+            .collect();
+        way(&nodes, "<tag k='junction' v='roundabout'/>");
+    }
+    for arm in 0..4 {
+        way(&[arm * NODES / 4, 100 + arm], "");
+        way(&[100 + arm, 200 + arm], "");
+    }
+    text + "</osm>"
+}
+
+#[test]
+fn a_town_is_the_same_however_its_ways_are_parted() {
+    for pieces in [1, 2, 4, 8, 12] {
+        for side in [1.0, -1.0] {
+            let found = roundabouts(&osm::read(&town(pieces, side), None).unwrap());
+            assert_eq!(found.len(), 1, "{pieces} {side}");
+            assert_eq!(found[0].is_clockwise, side < 0.0);
+            assert_eq!(found[0].arms.len(), 4, "{pieces} {side}");
+            for arm in &found[0].arms {
+                assert_eq!(
+                    (arm.entries.len(), arm.exits.len()),
+                    (1, 1),
+                    "{pieces} {side}"
+                );
+                // Followed beyond the first piece.
+                assert!(arm.entries[0].way.length_m() > 55.0);
+                assert!(arm.exits[0].way.length_m() > 55.0);
+            }
+            let elements = Elements::of(&found[0]);
+            assert!(
+                (elements.outer_diameter_m - 29.5).abs() < 0.2,
+                "{elements:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn loops_that_nobody_drives_round_are_no_roundabouts() {
+    for (from, to) in [
+        ("<tag k='junction' v='roundabout'/>", ""),
+        ("residential", "footway"),
+    ] {
+        let map = osm::read(&town(1, 1.0).replace(from, to), None).unwrap();
+        assert_eq!(roundabouts(&map), [], "{to}");
+    }
+}
+
+#[test]
+fn entries_that_follow_each_other_are_arms_of_their_own() {
+    let mut map = circle_and_arm(13.0);
+    for (number, angle_deg) in [(3, -30.0f64), (4, 30.0), (5, 90.0)] {
+        let (sine, cosine) = angle_deg.to_radians().sin_cos();
+        let way = [[80.0 * cosine, 80.0 * sine], [17.0 * cosine, 17.0 * sine]];
+        map.lanes.push(lane(id(number, 1), way));
+        map.connectors.push(leads(id(number, 1), id(1, 1)));
+    }
+    assert_eq!(roundabouts(&map)[0].arms.len(), 4);
+}
+
+/// What a crafted file may cost grows with its length.
+#[test]
+fn crafted_files_are_read_in_time() {
+    let comments = format!("SCENARIO x\n{}\nENDSCENARIO", "/**/".repeat(200_000));
+    assert!(scn::read(&comments).is_ok());
+    let mut map = circle_and_arm(13.0);
+    let mut declared = roundabouts(&map)[0].declaration(1, &map).unwrap();
+    declared.junctions = vec![declared.junctions[0]; 100_000];
+    map.declared.push(declared);
+    assert_eq!(roundabouts(&map)[0].arms[0].entries.len(), 1);
 }

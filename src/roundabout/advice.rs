@@ -156,7 +156,7 @@ impl ArmAdvice {
             seen_share: 1.0,
         };
         for (number, conflict) in entry.conflicts.iter().enumerate() {
-            let [begin_s, end_s] = motion.window_s(site, conflict, parameters);
+            let [begin_s, end_s] = motion.window_s(conflict, parameters);
             if end_s <= 0.0 {
                 // Past it already.
                 continue;

@@ -76,7 +76,9 @@ impl OwnMotion {
     pub(super) fn time_s(&self, way_m: f64, parameters: &RoundaboutParameters) -> f64 {
         let way_m = way_m.max(0.0);
         let (a, top) = (parameters.acceleration_mps2, parameters.speed_mps);
-        let from = self.speed_mps.clamp(0.0, top);
+        let from = self.speed_mps.max(0.0);
+        // Who is faster already goes on as he does.
+        let top = top.max(from);
         let rise_m = (top * top - from * from) / (2.0 * a);
         if way_m <= rise_m {
             (libm::sqrt(from * from + 2.0 * a * way_m) - from) / a
@@ -88,20 +90,14 @@ impl OwnMotion {
     /// From when to when the vehicle is at a conflict point of its way in.
     pub(super) fn window_s(
         &self,
-        site: &Site,
         conflict: &Conflict,
         parameters: &RoundaboutParameters,
     ) -> [f64; 2] {
-        let half_m = site.rings[conflict.ring].width_m / 2.0;
-        let reach_m = conflict.along_m - half_m - self.front_m;
-        let clear_m = conflict.along_m + half_m + parameters.own_length_m - self.front_m;
+        let [begin_m, end_m] = conflict.zone_m;
+        let reach_m = begin_m - self.front_m;
         // Where the way ends on the circle the vehicle does not cross it: it is gone from the
         // point when its rear is past it.
-        let clear_m = if conflict.kind == LaneKind::Road {
-            clear_m - half_m
-        } else {
-            clear_m
-        };
+        let clear_m = end_m + parameters.own_length_m - self.front_m;
         [reach_m, clear_m].map(|way_m| self.time_s(way_m, parameters))
     }
 }
@@ -260,9 +256,11 @@ impl Approach {
         let half_m = object.length_m / 2.0 + self.zone_m;
         let (front_m, rear_m) = (self.way_m - half_m, self.way_m + half_m);
         let stands = fast_mps + 2.0 * object.speed_deviation_mps < WAITS_MPS && !self.is_new;
-        let [begin_s, end_s] = if stands {
+        let is_there = front_m <= 0.0 && rear_m >= 0.0;
+        let [begin_s, end_s] = if stands && self.on_circle && self.way_m > 0.0 {
+            [self.begin_s(object, front_m, fast_mps), HORIZON_S]
+        } else if stands {
             // Who stands where the ways cross is in the way as long as he stands.
-            let is_there = front_m <= 0.0 && rear_m >= 0.0;
             is_there.then_some([0.0, HORIZON_S])?
         } else {
             let end_s = time_s(object, rear_m, slow_mps, DEVIATIONS_BEHIND);

@@ -134,6 +134,7 @@ impl Watcher {
     /// Forgets who was where.
     pub fn forget(&mut self) {
         self.watched = None;
+        self.advice.own_arm = None;
         self.beliefs.clear();
         self.unseen = Unseen::default();
         self.last = None;
@@ -214,7 +215,8 @@ impl Watcher {
 
     fn advise(&mut self, index: usize, situation: &Situation<'_>) {
         let site = &self.sites[index];
-        let own = Own::of(site, situation, &self.parameters);
+        let last_arm = self.advice.own_arm;
+        let own = Own::of(site, situation, last_arm, &self.parameters);
         let mut advice = std::mem::take(&mut self.advice);
         advice.name.clone_from(&site.name);
         advice.centre_m = site.centre_m;
@@ -254,7 +256,7 @@ impl Watcher {
         let Some(entry) = arm.entries.get(own.map_or(0, |own| own.lane)) else {
             return ArmAdvice::closed(arm.bearing_rad);
         };
-        let waits = || standing(site, entry, self.parameters.own_length_m);
+        let waits = || standing(entry, self.parameters.own_length_m);
         let motion = own.and_then(|own| own.motion).unwrap_or_else(waits);
         let asked = Asked {
             site,
@@ -276,6 +278,11 @@ impl Watcher {
             unseen,
             &self.parameters,
         );
+        if let Some(ahead) = own.and_then(|own| own.ahead(entry, users)) {
+            advice.may_enter = false;
+            advice.margin_s = 0.0;
+            advice.hindrance = Some(Hindrance::RoadUser(ahead));
+        }
         let since = self.since.unwrap_or(situation.time);
         let is_fresh = (situation.time - since).seconds() < FIRST_LOOK_S;
         if is_fresh && situation.sight.is_some() {

@@ -1,8 +1,9 @@
 //! Where the vehicle is on the site, and how it goes on.
 
 use super::advice::State;
-use super::gap::OwnMotion;
-use super::site::{Conflict, Entry, Site};
+use super::gap::{OwnMotion, User};
+use super::lanes::Place;
+use super::site::{Entry, Site};
 use super::{RoundaboutParameters, Situation};
 use crate::ego::wrapped_rad;
 use crate::roadmap::Polyline;
@@ -11,19 +12,15 @@ use crate::roadmap::Polyline;
 const STOP_M: f64 = 1.0;
 
 /// A vehicle that waits: as near to the circle as it can stand without being in anybody's way.
-pub(super) fn standing(site: &Site, entry: &Entry, own_length_m: f64) -> OwnMotion {
-    let zone_m = |conflict: &Conflict| {
-        let half_m = site.rings[conflict.ring].width_m / 2.0;
-        [conflict.along_m - half_m, conflict.along_m + half_m]
-    };
+pub(super) fn standing(entry: &Entry, own_length_m: f64) -> OwnMotion {
     // From the circle outward, to where the next zone leaves room for it.
     let mut stop_m = entry.way.length_m();
     for (index, conflict) in entry.conflicts.iter().enumerate().rev() {
-        stop_m = zone_m(conflict)[0] - STOP_M;
+        stop_m = conflict.zone_m[0] - STOP_M;
         let before = index
             .checked_sub(1)
             .and_then(|index| entry.conflicts.get(index));
-        let room_m = before.map_or(f64::INFINITY, |before| stop_m - zone_m(before)[1]);
+        let room_m = before.map_or(f64::INFINITY, |before| stop_m - before.zone_m[1]);
         if room_m >= own_length_m {
             break;
         }
@@ -50,9 +47,11 @@ impl Own {
         motion: None,
     };
 
+    /// `last_arm` is the one that it was at before: who is on the circle comes past the ends of other ways in.
     pub(super) fn of(
         site: &Site,
         situation: &Situation<'_>,
+        last_arm: Option<usize>,
         parameters: &RoundaboutParameters,
     ) -> Self {
         /// A vehicle is on a way if it is no farther off than half a lane, and points along it.
@@ -73,18 +72,23 @@ impl Own {
             (station.distance_m < ASIDE_M && turned_rad.abs() < TURNED_RAD).then_some(station)
         };
         let speed_mps = situation.vehicle_speed_mps.max(0.0);
+        let away_m = libm::hypot(x - site.centre_m[0], y - site.centre_m[1]);
+        let is_inside = away_m < site.outer_m;
         for (arm, ways) in site.arms.iter().enumerate() {
             for (lane, entry) in ways.entries.iter().enumerate() {
                 let Some(station) = is_on(&entry.way) else {
                     continue;
                 };
+                if is_inside && last_arm != Some(arm) {
+                    continue;
+                }
                 let motion = OwnMotion {
                     front_m: station.along_m + parameters.own_front_m,
                     speed_mps,
                 };
                 if motion.front_m < entry.way.length_m() + parameters.own_length_m {
                     return Self {
-                        state: motion.state(site, entry, parameters),
+                        state: motion.state(entry, parameters),
                         arm: Some(arm),
                         lane,
                         motion: Some(motion),
@@ -112,10 +116,36 @@ impl Own {
     }
 }
 
+impl Own {
+    /// Somebody who stands or goes before the vehicle on its own way in.
+    pub(super) fn ahead(&self, entry: &Entry, users: &[User<'_>]) -> Option<u32> {
+        let front_m = self.motion?.front_m;
+        let ahead = users.iter().filter_map(|user| {
+            let object = user.object;
+            let station = entry
+                .way
+                .nearest([object.centre_m[0], object.centre_m[1]])?;
+            // Across the way and along it, whichever way it is turned.
+            let half_m = object.width_m / 2.0;
+            let is_beside = station.distance_m > entry.width_m / 2.0 + half_m;
+            let is_ahead = station.along_m + half_m > front_m;
+            // Who is on the circle has a window of his own.
+            let is_before_circle = station.along_m < entry.way.length_m() - half_m;
+            let is_crossing = user
+                .lanes
+                .first()
+                .is_some_and(|on| matches!(on.place, Place::Ring(_)));
+            let counts = !is_beside && is_ahead && is_before_circle && !is_crossing;
+            counts.then_some((station.along_m, object.id))
+        });
+        ahead.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, id)| id)
+    }
+}
+
 impl OwnMotion {
     /// Whether it is time to brake.
-    fn state(&self, site: &Site, entry: &Entry, parameters: &RoundaboutParameters) -> State {
-        let stop_m = standing(site, entry, parameters.own_length_m).front_m - self.front_m;
+    fn state(&self, entry: &Entry, parameters: &RoundaboutParameters) -> State {
+        let stop_m = standing(entry, parameters.own_length_m).front_m - self.front_m;
         let brakes_m = self.speed_mps * self.speed_mps / (2.0 * parameters.deceleration_mps2);
         // A second of way is left to begin with it.
         if stop_m < brakes_m + self.speed_mps + STOP_M {

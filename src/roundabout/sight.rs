@@ -30,6 +30,10 @@ pub struct Sight<'a> {
 /// Height above the ground at which a road user is looked for: the bonnet of a car, the wheels of
 /// a cyclist.
 const LOOK_M: f64 = 0.7;
+/// So near the vehicle is seen around, though its lowest rays pass above.
+const NEAR_M: f64 = 6.0;
+/// A ray that passes a place higher than this above the look passes over cars.
+const OVER_M: f64 = 0.8;
 /// A ray that ends nearer than this before a place is taken to have reached it.
 const SHORT_M: f64 = 1.0;
 /// And by this share of the range: low rays meet the ground before the place.
@@ -60,7 +64,8 @@ impl Sight<'_> {
         let level = Vector3::new(x, y, self.sensor.translation_m.z);
         let from = self.sensor.rotation.transpose() * (level - self.sensor.translation_m);
         let out_m = libm::hypot(from.x, from.y);
-        if out_m < 1.0 {
+        // Nearer than the lowest rays fall.
+        if out_m < NEAR_M {
             return true;
         }
         let plane = self.ground;
@@ -74,7 +79,8 @@ impl Sight<'_> {
         let near_m = out_m * (1.0 - SHORT_SHARE) - SHORT_M;
         let seen = [above.wrapping_sub(1), above]
             .into_iter()
-            .filter(|&layer| layer < layers);
+            .filter(|&layer| layer < layers)
+            .filter(|&layer| (self.scan.slope(layer).0 - tangent) * out_m < OVER_M);
         let reached = |layer: usize, after: isize| {
             let column = azimuths.column_beside(column, after).unwrap_or(column);
             let reached_m = self.scan.reached_m()[column * MAX_LAYERS + layer];
@@ -139,6 +145,9 @@ impl Unseen {
                 let at_m = ring.circle.at(angle_rad(site, place, count));
                 if sight.reaches(at_m) {
                     stretch.may_hold[place] = false;
+                } else if ring.kind == LaneKind::Road && is_mouth(site, at_m) {
+                    // Who comes out of an arm there is not seen either.
+                    stretch.may_hold[place] = true;
                 } else {
                     // Should he not be listed any more, he is still there.
                     stretch.may_hold[place] |= is_listed(objects, at_m);
@@ -161,25 +170,36 @@ impl Unseen {
     /// How long it takes from the nearest place where somebody may be who is not listed to a conflict point, if
     /// there is one; and the share of the ring where nobody is.
     pub(super) fn before(&self, site: &Site, conflict: &Conflict, road_mps: f64) -> (f64, f64) {
-        let ring = &site.rings[conflict.ring];
-        let Some(stretch) = self.rings.get(conflict.ring) else {
-            return (0.0, 0.0);
-        };
-        let count = stretch.may_hold.len();
-        let hidden = (0..count).filter(|&place| stretch.may_hold[place]);
-        let way_m = |place: usize| {
-            let round_rad = site.round_rad(angle_rad(site, place, count), conflict.angle_rad);
-            let back_rad = if ring.kind == LaneKind::Pavement {
-                TAU - round_rad
-            } else {
-                TAU
+        let mut soonest_s = f64::INFINITY;
+        let mut least_share: f64 = 1.0;
+        // Who comes round an inner lane counts, too.
+        let rings = site.rings.iter().zip(&self.rings);
+        for (ring, stretch) in rings.filter(|(ring, _)| ring.kind == conflict.kind) {
+            let count = stretch.may_hold.len();
+            let hidden = (0..count).filter(|&place| stretch.may_hold[place]);
+            let way_m = |place: usize| {
+                let round_rad = site.round_rad(angle_rad(site, place, count), conflict.angle_rad);
+                let back_rad = if ring.kind == LaneKind::Pavement {
+                    TAU - round_rad
+                } else {
+                    TAU
+                };
+                ring.circle.radius_m * round_rad.min(back_rad)
             };
-            ring.circle.radius_m * round_rad.min(back_rad)
-        };
-        let nearest_m = hidden.clone().map(way_m).fold(f64::INFINITY, f64::min);
-        let comes_s = nearest_m / fastest_mps(ring.kind, road_mps);
-        (comes_s, 1.0 - hidden.count() as f64 / count.max(1) as f64)
+            let nearest_m = hidden.clone().map(way_m).fold(f64::INFINITY, f64::min);
+            soonest_s = soonest_s.min(nearest_m / fastest_mps(ring.kind, road_mps));
+            least_share = least_share.min(1.0 - hidden.count() as f64 / count.max(1) as f64);
+        }
+        (soonest_s, least_share)
     }
+}
+
+/// Whether a way in ends near a place.
+fn is_mouth(site: &Site, [x, y]: [f64; 2]) -> bool {
+    const NEAR_M: f64 = 4.0;
+    let entries = site.arms.iter().flat_map(|arm| &arm.entries);
+    let mut ends = entries.filter_map(|entry| entry.way.points_m().last());
+    ends.any(|end_m| libm::hypot(end_m[0] - x, end_m[1] - y) < NEAR_M)
 }
 
 fn is_listed(objects: &[Object], at_m: [f64; 2]) -> bool {

@@ -70,6 +70,8 @@ pub(super) struct Conflict {
     pub(super) angle_rad: f64,
     /// Along the way.
     pub(super) along_m: f64,
+    /// From where to where along the way a vehicle is in the way of those on the ring: it may meet it at any angle.
+    pub(super) zone_m: [f64; 2],
 }
 
 /// An arm.
@@ -212,7 +214,14 @@ impl Site {
         let points_m = way.points_m();
         let inside = |at_m: &[f64; 2]| circle.off_m(*at_m) < TOUCHES_M;
         if let Some(first) = points_m.iter().position(inside) {
-            return (first > 0).then(|| Polyline::through(points_m[..=first].iter().copied()));
+            let [before_m, met_m] = [*points_m.get(first.checked_sub(1)?)?, points_m[first]];
+            let [from_m, to_m] = [before_m, met_m].map(|at_m| circle.off_m(at_m));
+            let share = ((from_m - TOUCHES_M) / (from_m - to_m)).clamp(0.0, 1.0);
+            let share = if to_m < -TOUCHES_M { share } else { 1.0 };
+            let cut_m = [0, 1].map(|axis| before_m[axis] + share * (met_m[axis] - before_m[axis]));
+            return Some(Polyline::through(
+                points_m[..first].iter().copied().chain([cut_m]),
+            ));
         }
         let (end_m, heading_rad) = way.at(way.length_m());
         let (sine, cosine) = libm::sincos(heading_rad);
@@ -236,13 +245,7 @@ impl Site {
         let mut found = vec![];
         for (index, ring) in self.rings.iter().enumerate() {
             if ends_on == index {
-                let end_m = way.at(way.length_m()).0;
-                found.push(Conflict {
-                    ring: index,
-                    kind: ring.kind,
-                    angle_rad: self.angle_rad(end_m),
-                    along_m: way.length_m(),
-                });
+                found.push(self.conflict(way, index, way.length_m()));
                 continue;
             }
             let mut along_m = 0.0;
@@ -251,18 +254,33 @@ impl Site {
                 let [from_m, to_m] = [pair[0], pair[1]].map(|at_m| ring.circle.off_m(at_m));
                 if from_m * to_m < 0.0 {
                     let share = from_m / (from_m - to_m);
-                    let (at_m, _) = way.at(along_m + share * length_m);
-                    found.push(Conflict {
-                        ring: index,
-                        kind: ring.kind,
-                        angle_rad: self.angle_rad(at_m),
-                        along_m: along_m + share * length_m,
-                    });
+                    found.push(self.conflict(way, index, along_m + share * length_m));
                 }
                 along_m += length_m;
             }
         }
         found.sort_by(|a, b| a.along_m.total_cmp(&b.along_m));
         found
+    }
+
+    /// Where a way meets the middle of a ring.
+    fn conflict(&self, way: &Polyline, index: usize, along_m: f64) -> Conflict {
+        const STEP_M: f64 = 0.25;
+        let ring = &self.rings[index];
+        let is_on = |along_m: f64| ring.circle.off_m(way.at(along_m).0).abs() < ring.width_m / 2.0;
+        let (mut begin_m, mut end_m) = (along_m, along_m);
+        while begin_m > 0.0 && is_on(begin_m - STEP_M) {
+            begin_m -= STEP_M;
+        }
+        while end_m < way.length_m() && is_on(end_m + STEP_M) {
+            end_m += STEP_M;
+        }
+        Conflict {
+            ring: index,
+            kind: ring.kind,
+            angle_rad: self.angle_rad(way.at(along_m).0),
+            along_m,
+            zone_m: [begin_m.max(0.0), end_m.min(way.length_m())],
+        }
     }
 }

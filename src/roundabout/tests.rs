@@ -250,3 +250,49 @@ fn a_vehicle_on_its_way_has_states() {
         assert_eq!(watcher.advice().unwrap().state, expected, "{y}");
     }
 }
+
+/// He may go on at any time.
+#[test]
+fn who_stands_on_the_circle_is_waited_for() {
+    let mut watcher = watcher();
+    let mut stands = round(Class::Car, ROAD_M, 255.0, 0.0);
+    stands.yaw_rate_radps = 0.0;
+    watcher.watch(&situation(&[stands]));
+    let arm = own_arm(&watcher);
+    assert_eq!(arm.hindrance, Some(Hindrance::RoadUser(7)), "{arm:?}");
+}
+
+#[test]
+fn who_stands_on_the_own_way_in_is_in_the_way() {
+    let mut watcher = watcher();
+    let mut ahead = round(Class::Pedestrian, ROAD_M, 0.0, 0.0);
+    ahead.centre_m = [0.2, 4.6, 0.7];
+    watcher.watch(&situation(std::slice::from_ref(&ahead)));
+    assert_eq!(own_arm(&watcher).hindrance, Some(Hindrance::RoadUser(7)));
+    // Beside the lane he is in nobody's way.
+    ahead.centre_m = [6.0, 0.0, 0.7];
+    watcher.forget();
+    watcher.watch(&situation(&[ahead]));
+    assert!(own_arm(&watcher).may_enter);
+}
+
+/// Past the ends of other ways in.
+#[test]
+fn who_is_on_the_circle_is_at_no_arm() {
+    let mut watcher = watcher();
+    for angle_deg in (-60..250).step_by(10) {
+        let at = round(Class::Car, ROAD_M, f64::from(angle_deg), 6.0);
+        let mut circling = situation(&[]);
+        circling.vehicle = Some(Pose {
+            position_m: at.centre_m,
+            yaw_rad: at.yaw_rad,
+        });
+        watcher.watch(&circling);
+        let advice = watcher.advice().unwrap();
+        assert_eq!(
+            (advice.state, advice.own_arm),
+            (State::Circling, None),
+            "{angle_deg}"
+        );
+    }
+}

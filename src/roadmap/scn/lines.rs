@@ -7,13 +7,15 @@ use crate::roadmap::MapError;
 pub(super) struct Line<'a> {
     /// Counted from 1.
     pub(super) number: usize,
-    /// Of the key, counted from 1, in characters.
-    column: usize,
+    /// As the file has it.
+    whole: &'a str,
+    /// Of the key, in bytes.
+    offset: usize,
     pub(super) key: &'a str,
     /// Trimmed.
     pub(super) rest: &'a str,
-    /// Of the rest.
-    rest_column: usize,
+    /// Of the rest, in bytes.
+    rest_offset: usize,
 }
 
 impl Line<'_> {
@@ -21,7 +23,7 @@ impl Line<'_> {
     pub(super) fn error(&self, problem: impl Into<String>) -> MapError {
         MapError {
             line: self.number,
-            column: self.column,
+            column: column(self.whole, self.offset),
             problem: problem.into(),
         }
     }
@@ -29,7 +31,7 @@ impl Line<'_> {
     /// An error at what is behind the key.
     pub(super) fn rest_error(&self, problem: impl Into<String>) -> MapError {
         MapError {
-            column: self.rest_column,
+            column: column(self.whole, self.rest_offset),
             ..self.error(problem)
         }
     }
@@ -51,13 +53,13 @@ impl<'a> Lines<'a> {
     /// A comment that does not end.
     pub(super) fn of(text: &'a str) -> Result<Self, MapError> {
         let mut lines = vec![];
-        let mut comment: Option<Comment> = None;
+        let mut comment: Option<Comment<'_>> = None;
         let mut count = 0;
         for (index, whole) in text.lines().enumerate() {
             count = index + 1;
             let mut rest = whole;
             while !rest.is_empty() {
-                let begins = column(whole, rest);
+                let begins = offset(whole, rest);
                 let open = comment.as_ref().is_some_and(|comment| !comment.is_ours);
                 let mark = if comment.is_some() { "*/" } else { "/*" };
                 let (piece, behind) = match rest.split_once(mark) {
@@ -77,7 +79,8 @@ impl<'a> Lines<'a> {
                         rest = content.strip_prefix(OURS).unwrap_or(behind);
                         Some(Comment {
                             line: count,
-                            column: begins + piece.chars().count(),
+                            whole,
+                            offset: begins + piece.len(),
                             is_ours,
                         })
                     }
@@ -87,7 +90,7 @@ impl<'a> Lines<'a> {
         match comment {
             Some(comment) => Err(MapError {
                 line: comment.line,
-                column: comment.column,
+                column: column(comment.whole, comment.offset),
                 problem: "this comment does not end".to_owned(),
             }),
             None => Ok(Self {
@@ -125,9 +128,11 @@ impl<'a> Lines<'a> {
     }
 }
 
-struct Comment {
+struct Comment<'a> {
     line: usize,
-    column: usize,
+    whole: &'a str,
+    /// In bytes.
+    offset: usize,
     is_ours: bool,
 }
 
@@ -145,20 +150,25 @@ fn push<'a>(lines: &mut Vec<Line<'a>>, number: usize, whole: &'a str, piece: &'a
     };
     lines.push(Line {
         number,
-        column: column(whole, item),
+        whole,
+        offset: offset(whole, item),
         key,
         rest,
-        rest_column: if rest.is_empty() {
-            column(whole, item) + item.chars().count()
+        rest_offset: if rest.is_empty() {
+            offset(whole, item) + item.len()
         } else {
-            column(whole, rest)
+            offset(whole, rest)
         },
     });
 }
 
-/// Where a part of a line begins.
-fn column(whole: &str, part: &str) -> usize {
-    let offset = part.as_ptr() as usize - whole.as_ptr() as usize;
+/// Where a part of a line begins, in bytes.
+fn offset(whole: &str, part: &str) -> usize {
+    part.as_ptr() as usize - whole.as_ptr() as usize
+}
+
+/// Counted from 1, in characters.
+fn column(whole: &str, offset: usize) -> usize {
     1 + whole
         .get(..offset)
         .map_or(0, |before| before.chars().count())

@@ -14,6 +14,7 @@
 //! VERTEX2
 //! X -218.5
 //! Y 78.2
+//! DIRECTION counterclockwise
 //! CIRCLE
 //! CIRCLEID 1
 //! LANETYPE road

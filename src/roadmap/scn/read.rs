@@ -1,7 +1,7 @@
 //! Reading scenarios.
 
 use super::lines::{Line, Lines};
-use super::values::{connector, interval, junction, kind, length, number, whole};
+use super::values::{connector, interval, is_clockwise, junction, kind, length, number, whole};
 use crate::ego::geodesy::Geodetic;
 use crate::roadmap::curve::Vertex;
 use crate::roadmap::{
@@ -259,6 +259,7 @@ impl<'a> Reader<'a> {
             id: 0,
             name: String::new(),
             centre_m: [0.0; 2],
+            is_clockwise: None,
             circles: vec![],
             junctions: vec![],
         };
@@ -268,6 +269,7 @@ impl<'a> Reader<'a> {
                 "ROUNDABOUTID" => found.id = whole(&line)?,
                 "ROUNDABOUTNAME" => found.name = line.rest.to_owned(),
                 "VERTEX2" => found.centre_m = self.coordinates()?.map(|(metres, _)| metres),
+                "DIRECTION" => found.is_clockwise = Some(is_clockwise(&line)?),
                 "CIRCLE" => found.circles.push(self.circle(&line)?),
                 "ENTRY" | "EXIT" => found.junctions.push(junction(&line)?),
                 "ENDROUNDABOUT" if found.circles.is_empty() => {

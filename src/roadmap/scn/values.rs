@@ -37,6 +37,19 @@ pub(super) fn kind(line: &Line<'_>) -> Read<LaneKind> {
     })
 }
 
+pub(super) fn is_clockwise(line: &Line<'_>) -> Read<bool> {
+    match line.rest {
+        "clockwise" => Ok(true),
+        "counterclockwise" => Ok(false),
+        other => {
+            let found = shortened(other);
+            Err(line.rest_error(format!(
+                "{found:?} is neither clockwise nor counterclockwise"
+            )))
+        }
+    }
+}
+
 /// As `[ 0 1.57 ]`.
 pub(super) fn interval(line: &Line<'_>) -> Read<[f64; 2]> {
     let problem = || line.rest_error("an interval is written [ from to ]");

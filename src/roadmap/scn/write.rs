@@ -12,8 +12,8 @@ use crate::roadmap::{
 /// By the lane from which they lead.
 type Connectors<'a> = BTreeMap<LaneId, Vec<&'a Connector>>;
 
-/// A scenario with the map's roads; what [`super::read`] makes of it is the same map, but for
-/// what was skipped.
+/// A scenario with the map's roads; what [`super::read`] makes of it has the same lanes,
+/// connectors and declared roundabouts. That a lane is circular is only in its road's name.
 pub fn write(map: &Roadmap) -> String {
     let mut out = Lines::default();
     out.put("SCENARIO", one_line(&map.name, "roads"));
@@ -198,6 +198,14 @@ impl Lines {
             self.put("ROUNDABOUTNAME", one_line(&roundabout.name, "roundabout"));
         }
         self.vertex(roundabout.centre_m);
+        if let Some(is_clockwise) = roundabout.is_clockwise {
+            let word = if is_clockwise {
+                "clockwise"
+            } else {
+                "counterclockwise"
+            };
+            self.put("DIRECTION", word);
+        }
         for circle in &roundabout.circles {
             self.bare("CIRCLE");
             self.put("CIRCLEID", circle.id);

@@ -165,6 +165,7 @@ pub(super) fn roads(name: &str, passages: &[Passage], circles: &[Circle]) -> Roa
         id: 1,
         name: name.to_owned(),
         centre_m: passage.centre_m,
+        is_clockwise: Some(false),
         circles: (1u32..)
             .zip(circles)
             .map(|(id, circle)| DeclaredCircle {
