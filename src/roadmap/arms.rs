@@ -30,12 +30,14 @@ pub(super) fn accesses(
         .fold(outer_m, f64::max)
         + MOUTH_M;
     let is_near = |way: &Polyline| way.comes_within(centre_m, reach_m);
+    const MUCH: usize = 8;
     let on_ring = |way: &Polyline| {
         let points_m = way.points_m();
         roundabout.rings.iter().any(|ring| {
             let on = |&&at_m: &&[f64; 2]| ring.circle.off_m(at_m).abs() < 2.0 * OFF_CIRCLE_M;
-            // Much of it: a lane may begin or end with a piece of the road.
-            3 * points_m.iter().filter(on).count() > points_m.len()
+            let near = points_m.iter().filter(on).count();
+            // Or much of it: a drawn lane may begin or end with a piece of the road.
+            2 * near > points_m.len() || (near >= MUCH && 3 * near > points_m.len())
         })
     };
     let lanes = || network.lanes.iter().zip(&network.ways);

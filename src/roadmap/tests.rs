@@ -331,6 +331,8 @@ fn a_mirrored_map_is_driven_clockwise() {
     assert!(found[0].is_clockwise);
     assert_eq!(Elements::of(&found[0]).arms.len(), 1);
     map.declared.extend(found[0].declaration(1, &map));
+    // By its lanes, where the map does not say.
+    map.declared[0].is_clockwise = None;
     let declared = roundabouts(&map);
     assert_eq!(
         (declared[0].source, declared[0].is_clockwise),
