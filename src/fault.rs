@@ -1,6 +1,7 @@
 //! Why an envelope was of no use, and how often.
 
 use crate::cloud::{PacketRefusal, Refusal};
+use crate::ego::PoseRefusal;
 use crate::tally::Tally;
 use crate::wire::WireError;
 
@@ -18,43 +19,17 @@ pub enum Fault {
     /// A point cloud that is no whole revolution, or that the array cannot hold.
     #[error("point cloud refused: {0}")]
     Refused(#[from] Refusal),
-    /// A pose of a receiver that knows no place.
-    #[error(
-        "message {data_type}: a place at 0 degrees north and east is that of a receiver without a fix"
-    )]
-    NoFix {
+    /// A pose that is of no use.
+    #[error("message {data_type}: {refusal}")]
+    Pose {
         /// The envelope's data type.
         data_type: i32,
-    },
-    /// A pose of another sender than the one that is listened to.
-    #[error(
-        "message {data_type}: from sender {sender_stamp}, while sender {listened} is listened to"
-    )]
-    OtherPoseSender {
-        /// The envelope's data type.
-        data_type: i32,
-        /// Who sent it.
-        sender_stamp: u32,
-        /// Who is listened to.
-        listened: u32,
-    },
-    /// A pose whose time has nothing to do with that of the revolutions.
-    #[error("message {data_type}: stamped {behind_s:.1} s behind the revolutions: not used")]
-    PoseClock {
-        /// The envelope's data type.
-        data_type: i32,
-        /// How far.
-        behind_s: f64,
+        /// Why not.
+        refusal: PoseRefusal,
     },
     /// A packet of a sensor that is of no use.
     #[error(transparent)]
     Packet(#[from] PacketRefusal),
-    /// A pose whose numbers cannot be a vehicle's on the earth.
-    #[error("message {data_type}: its numbers are no pose on the earth")]
-    ImplausiblePose {
-        /// The envelope's data type.
-        data_type: i32,
-    },
 }
 
 impl Fault {
@@ -63,11 +38,8 @@ impl Fault {
         match self {
             Self::Damaged { error, .. } => error.name(),
             Self::Refused(refusal) => refusal.name(),
-            Self::NoFix { .. } => "pose_without_fix",
-            Self::OtherPoseSender { .. } => "pose_other_sender",
-            Self::PoseClock { .. } => "pose_clock",
+            Self::Pose { refusal, .. } => refusal.name(),
             Self::Packet(refusal) => refusal.name(),
-            Self::ImplausiblePose { .. } => "pose_implausible",
         }
     }
 }

@@ -119,6 +119,9 @@ impl Pipeline {
         envelope: &Envelope<'_>,
         done: impl FnMut(Step),
     ) -> Result<Outcome, Fault> {
+        if envelope.data_type == SensorPackets::ID {
+            return self.handle_packets(envelope, done);
+        }
         let outcome = self.dispatch(envelope, done);
         if let Err(fault) = &outcome {
             self.count(fault);
@@ -126,15 +129,43 @@ impl Pipeline {
         outcome
     }
 
+    /// Packets of a recording, of which the last one closes a revolution. The first fault is told, if none does; all
+    /// are counted.
+    fn handle_packets(
+        &mut self,
+        envelope: &Envelope<'_>,
+        done: impl FnMut(Step),
+    ) -> Result<Outcome, Fault> {
+        let packets = SensorPackets::decode(envelope.payload, envelope.payload_offset);
+        let packets = packets.map_err(|error| {
+            let fault = Fault::Damaged {
+                data_type: envelope.data_type,
+                error,
+            };
+            self.count(&fault);
+            fault
+        })?;
+        let (mut is_closed, mut first) = (false, Ok(Outcome::Packets));
+        for packet in packets.iter() {
+            match self.take_packet(&packet) {
+                Ok(closes) => is_closed |= closes,
+                Err(fault) => first = first.and(Err(fault)),
+            }
+        }
+        if is_closed {
+            return Ok(Outcome::Revolution(self.perceive_packets(done)));
+        }
+        first
+    }
+
     fn count(&mut self, fault: &Fault) {
         self.counts.faults.count(fault.name());
         match fault {
             Fault::Refused(_) => self.counts.refused += 1,
             Fault::Packet(refusal) => self.counts.damaged += u64::from(refusal.is_damage()),
-            Fault::Damaged { .. } | Fault::ImplausiblePose { .. } => self.counts.damaged += 1,
-            Fault::NoFix { .. } | Fault::OtherPoseSender { .. } | Fault::PoseClock { .. } => {
-                self.counts.poses_refused += 1;
-            }
+            Fault::Damaged { .. } => self.counts.damaged += 1,
+            Fault::Pose { refusal, .. } if refusal.is_damage() => self.counts.damaged += 1,
+            Fault::Pose { .. } => self.counts.poses_refused += 1,
         }
     }
 
@@ -144,14 +175,14 @@ impl Pipeline {
     /// # Errors
     /// [`Fault`] when the packet, or the revolution that it closes, is of no use. It is counted.
     pub fn take_packet(&mut self, packet: &Packet<'_>) -> Result<bool, Fault> {
-        let result = self.take_counted(packet);
+        let result = self.take(packet);
         if let Err(fault) = &result {
             self.count(fault);
         }
         result
     }
 
-    fn take_counted(&mut self, packet: &Packet<'_>) -> Result<bool, Fault> {
+    fn take(&mut self, packet: &Packet<'_>) -> Result<bool, Fault> {
         self.counts.packets += 1;
         let taken = self.packets.take(packet, &self.configuration.cloud)?;
         self.counts.packets_lost += taken.lost;
@@ -199,63 +230,19 @@ impl Pipeline {
                 done,
             )));
         }
-        if envelope.data_type == SensorPackets::ID {
-            let packets = SensorPackets::decode(envelope.payload, envelope.payload_offset)
-                .map_err(damaged)?;
-            return self.dispatch_packets(&packets, done);
-        }
         if OWN_IDS.contains(&envelope.data_type) {
             return Ok(Outcome::Own);
         }
         match self.ego.hear(envelope).map_err(damaged)? {
             Heard::Nothing => Ok(Outcome::Other),
-            Heard::Implausible => Err(Fault::ImplausiblePose {
+            Heard::Refused(refusal) => Err(Fault::Pose {
                 data_type: envelope.data_type,
-            }),
-            Heard::NoFix => Err(Fault::NoFix {
-                data_type: envelope.data_type,
-            }),
-            Heard::OtherSender {
-                sender_stamp,
-                listened,
-            } => Err(Fault::OtherPoseSender {
-                data_type: envelope.data_type,
-                sender_stamp,
-                listened,
-            }),
-            Heard::OtherClock { behind } => Err(Fault::PoseClock {
-                data_type: envelope.data_type,
-                behind_s: behind.seconds(),
+                refusal,
             }),
             Heard::Pose => {
                 self.counts.poses += 1;
                 Ok(Outcome::Pose)
             }
-        }
-    }
-
-    /// Packets of a recording, of which the last one closes a revolution. The first fault is told; all are counted.
-    fn dispatch_packets(
-        &mut self,
-        packets: &SensorPackets,
-        done: impl FnMut(Step),
-    ) -> Result<Outcome, Fault> {
-        let (mut is_closed, mut fault) = (false, None);
-        for packet in packets.iter() {
-            match self.take_counted(&packet) {
-                Ok(closes) => is_closed |= closes,
-                // The caller counts the one that it is told.
-                Err(first) if fault.is_none() => fault = Some(first),
-                Err(other) => self.count(&other),
-            }
-        }
-        match fault {
-            _ if is_closed => {
-                fault.iter().for_each(|fault| self.count(fault));
-                Ok(Outcome::Revolution(self.perceive_packets(done)))
-            }
-            Some(fault) => Err(fault),
-            None => Ok(Outcome::Packets),
         }
     }
 
@@ -349,7 +336,6 @@ impl Pipeline {
         let sensor = sweep.local_attitude();
         let situation = Situation {
             time,
-            frame: sweep.frame,
             reference: sweep.reference,
             vehicle: sweep.vehicle,
             vehicle_speed_mps: libm::hypot(x, y),

@@ -8,7 +8,7 @@ use kreisel::cloud::{
     ByteOrderSource, CloudParameters, Dialect, OwnVehicle, Revolution, Scan, Source,
 };
 use kreisel::ego::geodesy::{Geodetic, LocalFrame};
-use kreisel::ego::{Ego, EgoParameters, Frame, HeadingUnit, Heard, Sweep};
+use kreisel::ego::{Ego, EgoParameters, Frame, HeadingUnit, Heard, PoseRefusal, Sweep};
 use kreisel::parameter::Profile;
 use kreisel::time::{Span, Time};
 use kreisel::wire::Envelope;
@@ -249,7 +249,10 @@ fn what_is_no_pose_on_the_earth_is_refused() {
         },
     ];
     for message in &wild {
-        assert_eq!(hear(&mut ego, 0.0, message), Heard::Implausible);
+        assert_eq!(
+            hear(&mut ego, 0.0, message),
+            Heard::Refused(PoseRefusal::Implausible)
+        );
     }
     assert_eq!(sweep(&mut ego, 0.0).vehicle, None);
 }
@@ -262,7 +265,10 @@ fn a_receiver_without_a_fix_is_refused_and_ties_the_frame_to_nothing() {
         lon: 0.0,
         ..fix(0.0, 0.0, 0.0)
     };
-    assert_eq!(hear(&mut ego, 0.0, &nowhere), Heard::NoFix);
+    assert_eq!(
+        hear(&mut ego, 0.0, &nowhere),
+        Heard::Refused(PoseRefusal::NoFix)
+    );
     assert_eq!(hear(&mut ego, 0.1, &fix(7.0, 0.0, 0.0)), Heard::Pose);
     let place_m = sweep(&mut ego, 0.1).vehicle.unwrap().position_m;
     assert_eq!(place_m, [0.0; 3]);
@@ -278,10 +284,10 @@ fn a_second_sender_of_poses_is_told_and_changes_nothing() {
             Heard::Pose
         );
         let beside = fix(seconds + 1.2, 0.0, 90.0);
-        let expected = Heard::OtherSender {
+        let expected = Heard::Refused(PoseRefusal::OtherSender {
             sender_stamp: 2,
             listened: 0,
-        };
+        });
         assert_eq!(hear_from(&mut ego, 2, seconds, &beside), expected);
     }
     let place_m = sweep(&mut ego, 2.99).vehicle.unwrap().position_m;
@@ -298,7 +304,10 @@ fn a_clock_that_is_steadily_behind_is_made_up_for_and_another_one_is_told() {
         let message = fix(seconds, 0.0, 90.0);
         hear(&mut late, seconds - 0.8, &message);
         let heard = hear(&mut other, seconds - 3600.0, &message);
-        told += u32::from(matches!(heard, Heard::OtherClock { .. }));
+        told += u32::from(matches!(
+            heard,
+            Heard::Refused(PoseRefusal::OtherClock { .. })
+        ));
         if step % 10 == 9 {
             let vehicle = sweep(&mut late, seconds).vehicle.expect("a pose");
             // Poses are as old as their clock says, give or take the time from one to the next.

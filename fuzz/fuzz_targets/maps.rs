@@ -2,7 +2,7 @@
 #![no_main]
 
 use kreisel::config::Configuration;
-use kreisel::ego::{Frame, Pose};
+use kreisel::ego::Pose;
 use kreisel::roadmap::{Elements, Roadmap, osm, roundabouts, scn, simplified, svg};
 use kreisel::roundabout::{Situation, Watcher};
 use kreisel::time::Time;
@@ -50,7 +50,6 @@ fn watched(map: &Roadmap, centre_m: [f64; 2]) {
         };
         watcher.watch(&Situation {
             time: Time::from_micros(100_000 * i64::from(step)),
-            frame: Frame::Simulation,
             reference: None,
             vehicle: Some(vehicle),
             vehicle_speed_mps: 3.0,

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 
 use crate::roadmap::{LaneKind, Roadmap};
 use crate::roundabout::{Advice, Place, RoundaboutParameters, Situation, Watcher, Window};
-use crate::time::Time;
 use crate::track::{Class, Object};
 
 /// A gap that one should not miss.
@@ -292,43 +291,5 @@ fn compare_lanes(
         };
         lanes[kind][0] += usize::from(place(said, object) == Some(place_of_user));
         lanes[kind][1] += 1;
-    }
-}
-
-/// A true road user as an object that is surely known.
-pub(super) struct TrueState {
-    pub(super) id: u32,
-    pub(super) class: Class,
-    pub(super) place_m: [f64; 2],
-    pub(super) yaw_rad: f64,
-    pub(super) speed_mps: f64,
-    pub(super) yaw_rate_radps: f64,
-    pub(super) size_m: [f64; 3],
-}
-
-impl TrueState {
-    pub(super) fn object(&self, time: Time) -> Object {
-        Object {
-            id: self.id,
-            class: self.class,
-            class_probability: 1.0,
-            measured: true,
-            centre_m: [self.place_m[0], self.place_m[1], 0.0],
-            yaw_rad: self.yaw_rad,
-            speed_mps: self.speed_mps,
-            yaw_rate_radps: self.yaw_rate_radps,
-            length_m: self.size_m[0],
-            width_m: self.size_m[1],
-            height_m: self.size_m[2],
-            position_deviation_m: [0.0; 2],
-            yaw_deviation_rad: 0.0,
-            speed_deviation_mps: 0.0,
-            existence: 1.0,
-            // He was always there.
-            first_seen: Time::from_micros(0),
-            seen_since: Time::from_micros(0),
-            last_measured: time,
-            points: 0,
-        }
     }
 }

@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, anyhow};
 use serde::Deserialize;
 
 use super::files;
-use super::gap_score::{GapScore, TrueState};
+use super::gap_score::GapScore;
 use crate::ego::{Frame, Pose};
 use crate::pipeline::{Pipeline, RevolutionReport};
 use crate::roadmap::Roadmap;
@@ -169,7 +169,6 @@ impl Score {
             };
             let situation = Situation {
                 time: report.time,
-                frame: report.frame,
                 reference: pipeline.sweep().reference,
                 vehicle: Some(vehicle),
                 vehicle_speed_mps: line.ego.v,
@@ -204,24 +203,35 @@ impl Score {
 }
 
 impl TrueUser {
+    /// As an object that is surely known, and always was.
     fn object(&self, time: Time) -> Object {
-        let class = match self.class.as_str() {
-            "car" => Class::Car,
-            "truck" => Class::LargeVehicle,
-            "cyclist" => Class::Cyclist,
-            "pedestrian" => Class::Pedestrian,
-            _ => Class::Unclassified,
-        };
-        let state = TrueState {
+        Object {
             id: self.id,
-            class,
-            place_m: [self.x, self.y],
+            class: match self.class.as_str() {
+                "car" => Class::Car,
+                "truck" => Class::LargeVehicle,
+                "cyclist" => Class::Cyclist,
+                "pedestrian" => Class::Pedestrian,
+                _ => Class::Unclassified,
+            },
+            class_probability: 1.0,
+            measured: true,
+            centre_m: [self.x, self.y, 0.0],
             yaw_rad: self.yaw,
             speed_mps: self.v,
             yaw_rate_radps: self.yaw_rate,
-            size_m: [self.l, self.w, self.h],
-        };
-        state.object(time)
+            length_m: self.l,
+            width_m: self.w,
+            height_m: self.h,
+            position_deviation_m: [0.0; 2],
+            yaw_deviation_rad: 0.0,
+            speed_deviation_mps: 0.0,
+            existence: 1.0,
+            first_seen: Time::ZERO,
+            seen_since: Time::ZERO,
+            last_measured: time,
+            points: self.points,
+        }
     }
 }
 

@@ -19,6 +19,8 @@ mod rates;
 
 mod reading;
 
+mod refusal;
+
 mod senders;
 
 mod sources;
@@ -29,6 +31,7 @@ mod trust;
 
 pub use anchor::Anchor;
 pub use pose::{Placement, Pose, wrapped_rad};
+pub use refusal::PoseRefusal;
 pub use sweep::{Frame, Sweep};
 
 use crate::cloud::Scan;
@@ -103,22 +106,8 @@ pub enum Heard {
     Nothing,
     /// It was taken.
     Pose,
-    /// Its numbers cannot be a vehicle's.
-    Implausible,
-    /// It is that of a receiver that knows no place: 0 degrees north and east.
-    NoFix,
-    /// Another sender is listened to.
-    OtherSender {
-        /// Who sent it.
-        sender_stamp: u32,
-        /// Who is listened to.
-        listened: u32,
-    },
-    /// Its clock is so far from that of the revolutions that it is of no use.
-    OtherClock {
-        /// How far it is behind.
-        behind: Span,
-    },
+    /// It was not, and why.
+    Refused(PoseRefusal),
 }
 
 /// The ego step: hears poses, follows the sensor, tells where it was.

@@ -7,7 +7,9 @@ use super::reading::{Direction, Reading, Source};
 use super::senders::Senders;
 use super::sweep::KNOTS;
 use super::trust::Trust;
-use super::{Anchor, EgoParameters, Frame, HeadingUnit, Heard, Pose, Sweep, wrapped_rad};
+use super::{
+    Anchor, EgoParameters, Frame, HeadingUnit, Heard, Pose, PoseRefusal, Sweep, wrapped_rad,
+};
 use crate::time::{Span, Time};
 use crate::wire::{Envelope, WireError};
 
@@ -85,25 +87,25 @@ impl Sources {
             return Ok(Heard::Nothing);
         };
         if !reading.is_plausible() {
-            return Ok(Heard::Implausible);
+            return Ok(Heard::Refused(PoseRefusal::Implausible));
         }
         if reading.is_without_fix() {
-            return Ok(Heard::NoFix);
+            return Ok(Heard::Refused(PoseRefusal::NoFix));
         }
         let (time, sender_stamp) = (envelope.time(), envelope.sender_stamp);
         let admitted = self.senders.admit(envelope.data_type, sender_stamp, time);
         if let Err(listened) = admitted {
-            return Ok(Heard::OtherSender {
+            return Ok(Heard::Refused(PoseRefusal::OtherSender {
                 sender_stamp,
                 listened,
-            });
+            }));
         }
         if !self.parameters.use_poses {
             return Ok(Heard::Pose);
         }
         self.take(time, reading);
         if let Clock::Another(behind) = self.clock_of(&reading) {
-            return Ok(Heard::OtherClock { behind });
+            return Ok(Heard::Refused(PoseRefusal::OtherClock { behind }));
         }
         Ok(Heard::Pose)
     }

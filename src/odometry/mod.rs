@@ -12,6 +12,7 @@ mod map;
 mod motion;
 mod poles;
 mod registration;
+mod report;
 mod search;
 mod surfaces;
 mod uprights;
@@ -25,6 +26,8 @@ use features::Feature;
 use map::{Map, View};
 use motion::Motion;
 use registration::{Agreement, Alignment, Links};
+
+pub use report::{OdometryReport, Quality};
 
 /// The odometry step.
 #[derive(Debug, Clone)]
@@ -69,53 +72,6 @@ enum State {
     Lost(u32),
 }
 
-/// What became of a revolution.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct OdometryReport {
-    /// Features that were aligned.
-    pub features: usize,
-    /// Those with a surface of the map near them.
-    pub met: usize,
-    /// Those that lie on it.
-    pub fitting: usize,
-    /// Root mean square of how far these lie off it.
-    pub off_m: f64,
-    /// Standard deviation of the place that the revolution alone gives, in the direction along the ground in which it
-    /// tells least.
-    pub deviation_m: f64,
-    /// How the motion is followed.
-    pub quality: Quality,
-}
-
-/// How the motion is followed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Quality {
-    /// Not from what is seen.
-    #[default]
-    Off,
-    /// A map has begun, and no motion is known yet.
-    Begun,
-    /// By what is seen.
-    Following,
-    /// What is seen does not tell all of it: a plain, a tunnel. Prediction and poses tell the rest.
-    Degenerate,
-    /// What is seen does not fit: prediction and poses alone.
-    Lost,
-}
-
-impl Quality {
-    /// How Status names it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Off => "off",
-            Self::Begun => "begun",
-            Self::Following => "following",
-            Self::Degenerate => "degenerate",
-            Self::Lost => "lost",
-        }
-    }
-}
-
 /// What may have become of a revolution.
 #[derive(Debug, Clone, Copy)]
 struct Attempt {
@@ -143,6 +99,7 @@ const PATIENCE: u32 = 5;
 const MOST_TURNS: usize = 3;
 /// How surprising a pose may be before the prediction is trusted less.
 const MOST_SURPRISE: f64 = 2.0;
+
 impl Default for Odometry {
     fn default() -> Self {
         Self {

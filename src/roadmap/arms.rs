@@ -22,27 +22,13 @@ pub(super) fn accesses(
     roundabout: &Roundabout,
 ) -> (Vec<Access>, Vec<Access>) {
     let (centre_m, outer_m) = (roundabout.centre_m(), roundabout.outer_m());
+    let rings_m = roundabout.rings.iter().map(Ring::outer_m);
+    let reach_m = rings_m.fold(outer_m, f64::max) + MOUTH_M;
     // Of a large map nearly all lanes are far away.
-    let reach_m = roundabout
-        .rings
-        .iter()
-        .map(Ring::outer_m)
-        .fold(outer_m, f64::max)
-        + MOUTH_M;
     let is_near = |way: &Polyline| way.comes_within(centre_m, reach_m);
-    const MUCH: usize = 8;
-    let on_ring = |way: &Polyline| {
-        let points_m = way.points_m();
-        roundabout.rings.iter().any(|ring| {
-            let on = |&&at_m: &&[f64; 2]| ring.circle.off_m(at_m).abs() < 2.0 * OFF_CIRCLE_M;
-            let near = points_m.iter().filter(on).count();
-            // Or much of it: a drawn lane may begin or end with a piece of the road.
-            2 * near > points_m.len() || (near >= MUCH && 3 * near > points_m.len())
-        })
-    };
     let lanes = || network.lanes.iter().zip(&network.ways);
     let rings = lanes()
-        .filter(|(_, way)| is_near(way) && on_ring(way))
+        .filter(|(_, way)| is_near(way) && runs_on(roundabout, way))
         .map(|(lane, _)| lane.id);
     let rings: BTreeSet<LaneId> = rings.collect();
     let into_ring: BTreeSet<LaneId> = network
@@ -56,16 +42,6 @@ pub(super) fn accesses(
         .filter_map(|ring| network.leads.get(ring))
         .flatten();
     let from_ring: BTreeSet<LaneId> = from_ring.copied().collect();
-    // Prolonged beyond its end, or before its beginning.
-    let meets = |way: &Polyline, is_entry: bool| {
-        let (end_m, heading_rad) = way.at(if is_entry { way.length_m() } else { 0.0 });
-        let [x, y] = [centre_m[0] - end_m[0], centre_m[1] - end_m[1]];
-        let side = if is_entry { 1.0 } else { -1.0 };
-        let (sine, cosine) = libm::sincos(heading_rad);
-        let (ahead_m, beside_m) = (side * (x * cosine + y * sine), y * cosine - x * sine);
-        let away_m = libm::hypot(x, y) - outer_m;
-        away_m < 0.0 || (away_m < MOUTH_M && ahead_m > 0.0 && beside_m.abs() < outer_m)
-    };
     let (mut entries, mut exits) = (vec![], vec![]);
     for (index, (lane, way)) in lanes().enumerate() {
         if rings.contains(&lane.id)
@@ -75,14 +51,39 @@ pub(super) fn accesses(
         }
         // Who leads on elsewhere, or comes from elsewhere, does not begin or end here.
         let (leads_on, comes_from) = (network.leads_on(lane.id), network.comes_from(lane.id));
-        if into_ring.contains(&lane.id) || (!leads_on && meets(way, true)) {
+        if into_ring.contains(&lane.id) || (!leads_on && meets(roundabout, way, true)) {
             entries.push(access(lane, network.way_to(index), roundabout, true));
         }
-        if from_ring.contains(&lane.id) || (!comes_from && meets(way, false)) {
+        if from_ring.contains(&lane.id) || (!comes_from && meets(roundabout, way, false)) {
             exits.push(access(lane, network.way_from(index), roundabout, false));
         }
     }
     (entries, exits)
+}
+
+/// Whether most of a way lies on a ring, or much of it: a drawn lane may begin or end with a piece of the road.
+fn runs_on(roundabout: &Roundabout, way: &Polyline) -> bool {
+    /// Fewer points are not much, though they be a third of them.
+    const MUCH: usize = 8;
+    let points_m = way.points_m();
+    roundabout.rings.iter().any(|ring| {
+        let on = |&&at_m: &&[f64; 2]| ring.circle.off_m(at_m).abs() < 2.0 * OFF_CIRCLE_M;
+        let near = points_m.iter().filter(on).count();
+        2 * near > points_m.len() || (near >= MUCH && 3 * near > points_m.len())
+    })
+}
+
+/// Whether a way that nothing is connected to runs into the circle beyond its end, or came out of it before its
+/// beginning.
+fn meets(roundabout: &Roundabout, way: &Polyline, is_entry: bool) -> bool {
+    let outer_m = roundabout.outer_m();
+    let (end_m, heading_rad) = way.at(if is_entry { way.length_m() } else { 0.0 });
+    let [x, y] = [0, 1].map(|axis| roundabout.centre_m()[axis] - end_m[axis]);
+    let side = if is_entry { 1.0 } else { -1.0 };
+    let (sine, cosine) = libm::sincos(heading_rad);
+    let (ahead_m, beside_m) = (side * (x * cosine + y * sine), y * cosine - x * sine);
+    let away_m = libm::hypot(x, y) - outer_m;
+    away_m < 0.0 || (away_m < MOUTH_M && ahead_m > 0.0 && beside_m.abs() < outer_m)
 }
 
 /// Longest corner: from where a lane meets the circle outward, it has the arm's direction by then.

@@ -377,3 +377,6 @@ fn shifted<'a>(known: &[(&'a str, [f64; 2])], left_m: f64) -> Vec<(&'a str, [f64
     let beside = middle.parallel(left_m, is_loop);
     distinct.iter().map(|(id, _)| *id).zip(beside).collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -14,8 +14,6 @@ pub enum Source {
     Named,
     /// Its lanes close a circle.
     Closed,
-    /// Fitted to what was seen of it.
-    Seen,
 }
 
 impl Source {
@@ -25,7 +23,6 @@ impl Source {
             Self::Declared => "declared",
             Self::Named => "named",
             Self::Closed => "closed circle of lanes",
-            Self::Seen => "seen",
         }
     }
 }

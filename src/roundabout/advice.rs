@@ -34,17 +34,6 @@ impl State {
             Self::Leaving => 4,
         }
     }
-
-    /// For people.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Watching => "watching",
-            Self::Approaching => "approaching",
-            Self::Braking => "braking",
-            Self::Circling => "circling",
-            Self::Leaving => "leaving",
-        }
-    }
 }
 
 /// Why one should not enter.

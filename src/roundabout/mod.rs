@@ -13,8 +13,8 @@ mod site;
 
 use std::collections::BTreeMap;
 
+use crate::ego::Pose;
 use crate::ego::geodesy::Geodetic;
-use crate::ego::{Frame, Pose};
 use crate::parameter::{Text, parameters};
 use crate::roadmap::{Origin, Roadmap, Roundabout, roundabouts, simplified};
 use crate::time::Time;
@@ -65,9 +65,7 @@ parameters! {
 pub struct Situation<'a> {
     /// End of the sweep.
     pub time: Time,
-    /// Of all that follows.
-    pub frame: Frame,
-    /// Where that frame lies on the earth.
+    /// Where the local frame, in which all that follows is, lies on the earth; if it does.
     pub reference: Option<Geodetic>,
     /// The vehicle, if its pose is known.
     pub vehicle: Option<Pose>,
@@ -184,7 +182,6 @@ impl Watcher {
     /// The sites, where the local frame lies now.
     fn place(&mut self, situation: &Situation<'_>) {
         let placing = Placing {
-            frame: situation.frame,
             reference: situation.reference,
             origin: self.origin,
             shift_m: [self.parameters.map_x_m, self.parameters.map_y_m],

@@ -3,15 +3,13 @@
 use std::f64::consts::TAU;
 
 use crate::ego::geodesy::LocalFrame;
-use crate::ego::{Frame, wrapped_rad};
+use crate::ego::wrapped_rad;
 use crate::roadmap::{Access, LaneKind, Origin, Polyline, Ring, Roundabout};
 
 /// How a map's places become the local frame's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Placing {
-    /// Of the local frame.
-    pub(super) frame: Frame,
-    /// WGS84 place around which it lies.
+    /// WGS84 place around which the local frame lies.
     pub(super) reference: Option<crate::ego::geodesy::Geodetic>,
     /// Of the map.
     pub(super) origin: Option<Origin>,

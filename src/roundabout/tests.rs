@@ -56,7 +56,6 @@ fn round(class: Class, radius_m: f64, angle_deg: f64, speed_mps: f64) -> Object 
 fn situation(objects: &[Object]) -> Situation<'_> {
     Situation {
         time: NOW,
-        frame: Frame::Simulation,
         reference: None,
         vehicle: Some(Pose {
             position_m: [0.0; 3],
@@ -215,7 +214,6 @@ fn a_map_on_the_earth_follows_the_local_frame() {
     let origin = roads.origin.unwrap().place;
     let mut watcher = watcher();
     let mut there = situation(&[]);
-    there.frame = Frame::Earth;
     there.reference = Some(Geodetic {
         latitude_deg: origin.latitude_deg - 0.0001,
         ..origin
