@@ -8,8 +8,9 @@
 
 mod common;
 
-use common::{NAMES, drive, frame_of, plain_pass, quantiles, street, time_of};
+use common::{NAMES, drive, frame_of, plain_pass, quantiles, simulated, time_of};
 use kreisel::config::Configuration;
+use kreisel::pipeline::Pipeline;
 use kreisel::wire::Envelope;
 use kreisel::wire::point_cloud::{CompactPointCloud, POINT_CLOUD_ID};
 
@@ -17,7 +18,7 @@ use kreisel::wire::point_cloud::{CompactPointCloud, POINT_CLOUD_ID};
 fn row(frames: &[Vec<u8>], configuration: &Configuration) -> String {
     // The machine is not as fast all the time.
     let before_us = plain_pass();
-    let times_us = drive(frames, configuration);
+    let times_us = drive(frames, &mut Pipeline::new(configuration, 0));
     let unit_us = 0.5 * (before_us + plain_pass());
     let medians_us = times_us.map(|mut times_us| quantiles(&mut times_us).0);
     let cells: String = medians_us
@@ -119,7 +120,7 @@ fn main() {
     let rounds = arguments.iter().position(|argument| argument == "--rounds");
     let rounds = rounds.map_or(100, |at| arguments[at + 1].parse().unwrap());
     let configuration = Configuration::default();
-    let street = street(rounds);
+    let street = simulated("street", rounds);
     table(
         "columns, street",
         [500, 1000, 1500, 2000].map(|columns| {

@@ -1,6 +1,6 @@
 //! Every step of the pipeline, and the whole from envelope bytes to envelope bytes: on a real drive
 //! and on what a parked car saw (where the shared data is), on the simulated street with its poses,
-//! and on a worst case.
+//! at a roundabout with and without its map, and on a worst case.
 //! The steps are timed where they work, one after the other, with the caches as the others left
 //! them.
 //!
@@ -15,8 +15,11 @@
 
 mod common;
 
-use common::{NAMES, WARM, drive, frame_of, plain_pass, quantiles, street, time_of};
+use common::{NAMES, WARM, drive, frame_of, plain_pass, quantiles, simulated, time_of};
 use kreisel::config::Configuration;
+use kreisel::pipeline::Pipeline;
+use kreisel::roadmap::Roadmap;
+use kreisel::simulate::scenario;
 use kreisel::wire::point_cloud::CompactPointCloud;
 use kreisel::wire::{Envelope, Recording};
 
@@ -46,6 +49,9 @@ fn at_time(frame: &[u8], round: usize) -> Vec<u8> {
     let cloud = CompactPointCloud::decode(envelope.payload, 0).unwrap();
     frame_of(&cloud, time_of(round))
 }
+
+/// Traffic from all arms.
+const ROUNDABOUT: &str = "roundabout-traffic";
 
 /// A distance by the number of its return.
 type Distance = fn(u32) -> u32;
@@ -100,13 +106,17 @@ fn costly(distance: Distance, rounds: usize) -> Vec<Vec<u8>> {
         .collect()
 }
 
-fn bench(name: &str, frames: &[Vec<u8>], reaches_m: &[f64]) {
+fn bench(name: &str, frames: &[Vec<u8>], roads: Option<&Roadmap>, reaches_m: &[f64]) {
     let mut configuration = Configuration::default();
     for reach_m in reaches_m.iter().copied() {
         configuration.grid.reach_m = reach_m;
         // The machine is not as fast all the time.
         let before_us = plain_pass();
-        let times_us = drive(frames, &configuration);
+        let mut pipeline = Pipeline::new(&configuration, 0);
+        if let Some(roads) = roads {
+            pipeline.take_map(roads);
+        }
+        let times_us = drive(frames, &mut pipeline);
         let unit_us = 0.5 * (before_us + plain_pass());
         for (part, mut times_us) in NAMES.into_iter().zip(times_us) {
             let depends_on_reach = ["grid", "tiles", "whole"].contains(&part);
@@ -141,17 +151,26 @@ fn main() {
     for (name, recording, skipped) in RECORDED {
         if is_wanted(name) {
             match recorded(recording, skipped, rounds) {
-                Some(frames) => bench(name, &frames, &reaches_m),
+                Some(frames) => bench(name, &frames, None, &reaches_m),
                 None => eprintln!("skipped: {name}, as {recording} is not beside the checkout"),
             }
         }
     }
     if is_wanted("street") {
-        bench("street", &street(rounds), &reaches_m);
+        bench("street", &simulated("street", rounds), None, &reaches_m);
+    }
+    // What advice costs is in the step of the objects.
+    let roads = scenario::find(ROUNDABOUT).unwrap().roads();
+    for (name, roads) in [("roundabout", None), ("roundabout with map", roads)] {
+        if is_wanted(name) {
+            let frames = simulated(ROUNDABOUT, rounds);
+            bench(name, &frames, roads.as_ref(), &reaches_m);
+        }
     }
     for (name, distance) in COSTLY {
         if is_wanted(name) {
-            bench(name, &costly(distance, rounds.min(WARM + 50)), &reaches_m);
+            let frames = costly(distance, rounds.min(WARM + 50));
+            bench(name, &frames, None, &reaches_m);
         }
     }
 }

@@ -12,6 +12,7 @@ use crate::wire::envelope::Postmark;
 use crate::wire::environment::{Direction, Environment, PerceivedObject};
 use crate::wire::message::List;
 use crate::wire::object_list::ObjectList;
+use crate::wire::roundabout::Roundabout;
 use crate::wire::{Message, TimeStamp, object_list, opendlv};
 
 choices! {
@@ -54,6 +55,8 @@ pub struct Publisher {
     /// The objects that are sent, and their list.
     kept: Vec<Object>,
     list: ObjectList,
+    /// What is said of a roundabout beside it.
+    roundabout: Roundabout,
 }
 
 /// What a revolution's messages say beside its objects.
@@ -81,6 +84,7 @@ impl Publisher {
             ends: vec![],
             kept: vec![],
             list: ObjectList::default(),
+            roundabout: Roundabout::default(),
         }
     }
 
@@ -138,7 +142,10 @@ impl Publisher {
             sampled: heading.time,
             sender_stamp: self.sender_stamp,
         };
-        self.put(&postmark, &roundabout::message(heading.revolution, advice));
+        let mut message = std::mem::take(&mut self.roundabout);
+        roundabout::fill(&mut message, heading.revolution, advice);
+        self.put(&postmark, &message);
+        self.roundabout = message;
     }
 
     /// Makes the frames of what is to be sent of the map after the revolution of a time.

@@ -3,7 +3,6 @@
 use std::hint::black_box;
 use std::time::Duration;
 
-use kreisel::config::Configuration;
 use kreisel::pipeline::{Outcome, Pipeline};
 use kreisel::simulate::{Simulation, scenario};
 use kreisel::time::Time;
@@ -51,12 +50,12 @@ pub(crate) fn plain_pass() -> f64 {
     quantiles(&mut times_us).0
 }
 
-/// Drives of twenty seconds through the street, each with other traffic.
-pub(crate) fn street(rounds: usize) -> Vec<Vec<u8>> {
+/// Drives of twenty seconds through a scenario, each with other traffic.
+pub(crate) fn simulated(name: &str, rounds: usize) -> Vec<Vec<u8>> {
     const REVOLUTIONS: usize = 200;
     let mut frames = vec![];
     for seed in 0..rounds.div_ceil(REVOLUTIONS) {
-        let mut simulation = Simulation::new(scenario::find("street").unwrap(), seed as u64 + 1);
+        let mut simulation = Simulation::new(scenario::find(name).unwrap(), seed as u64 + 1);
         let mut bytes = vec![];
         for _ in 0..REVOLUTIONS.min(rounds - seed * REVOLUTIONS) {
             simulation.revolve(&mut bytes);
@@ -131,8 +130,7 @@ pub(crate) const NAMES: [&str; PARTS + 2] = [
 pub(crate) const WARM: usize = 5;
 
 /// Times of every part in microseconds, a list each as in [`NAMES`].
-pub(crate) fn drive(frames: &[Vec<u8>], configuration: &Configuration) -> [Vec<f64>; PARTS + 2] {
-    let mut pipeline = Pipeline::new(configuration, 0);
+pub(crate) fn drive(frames: &[Vec<u8>], pipeline: &mut Pipeline) -> [Vec<f64>; PARTS + 2] {
     let mut times_us: [Vec<f64>; PARTS + 2] = Default::default();
     for frame in frames {
         mark::step_begins();

@@ -14,29 +14,35 @@ const MOST_USERS: usize = 256;
 const MOST_RINGS: usize = 16;
 const LONGEST_NAME: usize = 100;
 
-/// What is said in a revolution. Of more windows than a datagram has room for, the soonest are kept.
-pub(super) fn message(revolution: u32, advice: &Advice) -> Roundabout {
-    let mut soonest: Vec<&Window> = advice.windows.iter().collect();
-    if soonest.len() > MOST_WINDOWS {
-        soonest.sort_by(|a, b| a.begin_s.total_cmp(&b.begin_s));
-        soonest.truncate(MOST_WINDOWS);
-    }
+/// Says in a message what is said in a revolution. Of more windows than a datagram has room for, the soonest are kept.
+pub(super) fn fill(message: &mut Roundabout, revolution: u32, advice: &Advice) {
+    message.revolution = revolution;
+    message.name.clear();
+    message.name.extend(advice.name.chars().take(LONGEST_NAME));
+    [message.x, message.y] = advice.centre_m;
+    message.diameter = advice.diameter_m as f32;
+    message.state = advice.state.number();
+    message.own_arm = advice.own_arm.map_or(-1, |arm| arm as i32);
     let arms = advice.arms.iter().take(MOST_ARMS);
-    let users = advice.users.iter().filter_map(lane_user);
-    let rings = advice.rings.iter().take(MOST_RINGS);
-    Roundabout {
-        revolution,
-        name: advice.name.chars().take(LONGEST_NAME).collect(),
-        x: advice.centre_m[0],
-        y: advice.centre_m[1],
-        diameter: advice.diameter_m as f32,
-        state: advice.state.number(),
-        own_arm: advice.own_arm.map_or(-1, |arm| arm as i32),
-        arms: List(arms.map(arm_of).collect()),
-        windows: List(soonest.into_iter().map(conflict_window).collect()),
-        users: List(users.take(MOST_USERS).collect()),
-        rings: List(rings.map(ring_of).collect()),
+    refill(&mut message.arms, arms.map(arm_of));
+    refill(
+        &mut message.windows,
+        advice.windows.iter().map(conflict_window),
+    );
+    let windows = &mut message.windows.0;
+    if windows.len() > MOST_WINDOWS {
+        windows.sort_by(|a, b| a.begin.total_cmp(&b.begin));
+        windows.truncate(MOST_WINDOWS);
     }
+    let users = advice.users.iter().filter_map(lane_user);
+    refill(&mut message.users, users.take(MOST_USERS));
+    let rings = advice.rings.iter().take(MOST_RINGS);
+    refill(&mut message.rings, rings.map(ring_of));
+}
+
+fn refill<T>(list: &mut List<T>, items: impl Iterator<Item = T>) {
+    list.0.clear();
+    list.0.extend(items);
 }
 
 fn arm_of(arm: &ArmAdvice) -> RoundaboutArm {
@@ -142,7 +148,8 @@ mod tests {
         };
         /// Of an envelope.
         const HEADER: usize = 100;
-        let said = message(9, &advice);
+        let mut said = Roundabout::default();
+        fill(&mut said, 9, &advice);
         assert_eq!(said.windows.0[0].object_id, 1);
         let mut bytes = vec![];
         said.encode(&mut bytes);

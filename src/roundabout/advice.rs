@@ -78,7 +78,7 @@ pub struct UserOnLane {
 
 impl UserOnLane {
     /// If it is on a lane at all.
-    pub(super) fn of(user: &User<'_>) -> Option<Self> {
+    pub(super) fn of(user: User<'_>) -> Option<Self> {
         let likeliest = user.lanes.first();
         let on = likeliest.filter(|on| on.place != Place::Elsewhere)?;
         Some(Self {

@@ -1,4 +1,6 @@
 //! Which lane a road user is on: a Bayes filter over the lanes, by place, heading, turn and class.
+//!
+//! Numbers without another source were set with `scripts/evaluate-roundabouts --seeds 1-8`.
 
 use super::site::Site;
 use crate::ego::wrapped_rad;
@@ -41,6 +43,38 @@ pub(super) struct Belief {
     lanes: Vec<(Place, f64)>,
     /// In the mean of the last moments, if he was seen before.
     mean_speed_mps: Option<f64>,
+}
+
+/// What is remembered of all of them, in places that are used again.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Beliefs {
+    /// Nobody's have no id.
+    places: Vec<(Option<u32>, Belief)>,
+}
+
+impl Beliefs {
+    /// Forgets all but those whose id counts.
+    pub(super) fn keep(&mut self, counts: impl Fn(u32) -> bool) {
+        for (id, belief) in &mut self.places {
+            if id.is_some_and(|id| !counts(id)) {
+                *id = None;
+                belief.lanes.clear();
+                belief.mean_speed_mps = None;
+            }
+        }
+    }
+
+    /// Somebody's; of a newcomer nothing is known.
+    pub(super) fn of(&mut self, id: u32) -> &mut Belief {
+        let position = |wanted| self.places.iter().position(|(other, _)| *other == wanted);
+        let place = position(Some(id)).or_else(|| position(None));
+        let place = place.unwrap_or_else(|| {
+            self.places.push((None, Belief::default()));
+            self.places.len() - 1
+        });
+        self.places[place].0 = Some(id);
+        &mut self.places[place].1
+    }
 }
 
 /// Lanes less probable than this are not told.
@@ -86,9 +120,22 @@ fn share(class: Class, kind: LaneKind) -> f64 {
 }
 
 /// One lane as it may hold a road user.
-struct Candidate {
+#[derive(Debug, Clone)]
+pub(super) struct Candidate {
     on: OnLane,
     likelihood: f64,
+    /// Likelihood times how probable the lane was before.
+    weight: f64,
+}
+
+impl Candidate {
+    fn new(on: OnLane, likelihood: f64) -> Self {
+        Self {
+            on,
+            likelihood,
+            weight: 0.0,
+        }
+    }
 }
 
 impl Belief {
@@ -98,25 +145,24 @@ impl Belief {
         site: &Site,
         object: &Object,
         passed_s: f64,
+        candidates: &mut Vec<Candidate>,
         found: &mut Vec<OnLane>,
     ) {
-        let candidates = candidates(site, object);
+        take_candidates(site, object, candidates);
         let (_, speed_mps) = course(object);
         let mean_mps = self.mean_speed_mps.unwrap_or(speed_mps);
         let mean_mps = mean_mps + MEAN_SHARE * (speed_mps - mean_mps);
         self.mean_speed_mps = Some(mean_mps);
         let gone_m = speed_mps * passed_s;
-        let weights: Vec<f64> = candidates
-            .iter()
-            .map(|candidate| {
-                candidate.likelihood * self.prior(&candidate.on, candidates.len(), gone_m)
-            })
-            .collect();
-        let sum: f64 = weights.iter().sum();
+        let count = candidates.len();
+        for candidate in candidates.iter_mut() {
+            candidate.weight = candidate.likelihood * self.prior(&candidate.on, count, gone_m);
+        }
+        let sum: f64 = candidates.iter().map(|candidate| candidate.weight).sum();
         self.lanes.clear();
         found.clear();
-        for (candidate, weight) in candidates.into_iter().zip(weights) {
-            let probability = weight / sum;
+        for candidate in candidates.iter() {
+            let probability = candidate.weight / sum;
             self.lanes.push((candidate.on.place, probability));
             if probability >= LEAST_PROBABILITY {
                 found.push(OnLane {
@@ -130,7 +176,7 @@ impl Belief {
                 });
             }
         }
-        found.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        found.sort_unstable_by(|a, b| b.probability.total_cmp(&a.probability));
     }
 
     /// How probable a lane is before it is known where somebody is now.
@@ -158,18 +204,17 @@ impl Belief {
 }
 
 /// The lanes that are near, and none of them.
-fn candidates(site: &Site, object: &Object) -> Vec<Candidate> {
-    let mut found = vec![Candidate {
-        on: OnLane {
-            place: Place::Elsewhere,
-            probability: 0.0,
-            along_m: 0.0,
-            offset_m: 0.0,
-            speed_mps: object.speed_mps,
-            mean_speed_mps: 0.0,
-        },
-        likelihood: ELSEWHERE,
-    }];
+fn take_candidates(site: &Site, object: &Object, found: &mut Vec<Candidate>) {
+    found.clear();
+    let nowhere = OnLane {
+        place: Place::Elsewhere,
+        probability: 0.0,
+        along_m: 0.0,
+        offset_m: 0.0,
+        speed_mps: object.speed_mps,
+        mean_speed_mps: 0.0,
+    };
+    found.push(Candidate::new(nowhere, ELSEWHERE));
     found.extend((0..site.rings.len()).filter_map(|ring| on_ring(site, ring, object)));
     for (arm, ways) in site.arms.iter().enumerate() {
         for (lane, entry) in ways.entries.iter().enumerate() {
@@ -181,7 +226,6 @@ fn candidates(site: &Site, object: &Object) -> Vec<Candidate> {
             found.extend(on_way(place, &exit.way, exit.width_m, object));
         }
     }
-    found
 }
 
 /// Direction of motion: a box that goes backwards moves against its yaw.
@@ -248,19 +292,17 @@ fn on_ring(site: &Site, index: usize, object: &Object) -> Option<Candidate> {
     } else {
         speed_mps * leads
     };
-    Some(Candidate {
-        on: OnLane {
-            place: Place::Ring(index),
-            probability: 0.0,
-            along_m: ring.circle.radius_m * angle_rad,
-            offset_m,
-            speed_mps: if is_along { leads_mps } else { -leads_mps },
-            mean_speed_mps: 0.0,
-        },
-        likelihood: place_fit(object, offset_m, ring.width_m)
-            * fit
-            * share(object.class, ring.kind),
-    })
+    let on = OnLane {
+        place: Place::Ring(index),
+        probability: 0.0,
+        along_m: ring.circle.radius_m * angle_rad,
+        offset_m,
+        speed_mps: if is_along { leads_mps } else { -leads_mps },
+        mean_speed_mps: 0.0,
+    };
+    let likelihood =
+        place_fit(object, offset_m, ring.width_m) * fit * share(object.class, ring.kind);
+    Some(Candidate::new(on, likelihood))
 }
 
 fn on_way(
@@ -277,19 +319,17 @@ fn on_way(
     let curvature_per_m = curvature_per_m(way, station.along_m);
     let (course_rad, speed_mps) = course(object);
     let fit = motion_fit(object, station.heading_rad, curvature_per_m);
-    Some(Candidate {
-        on: OnLane {
-            place,
-            probability: 0.0,
-            along_m: station.along_m,
-            offset_m: station.offset_m,
-            speed_mps: speed_mps * libm::cos(course_rad - station.heading_rad),
-            mean_speed_mps: 0.0,
-        },
-        likelihood: place_fit(object, station.offset_m, width_m)
-            * fit
-            * share(object.class, LaneKind::Road),
-    })
+    let on = OnLane {
+        place,
+        probability: 0.0,
+        along_m: station.along_m,
+        offset_m: station.offset_m,
+        speed_mps: speed_mps * libm::cos(course_rad - station.heading_rad),
+        mean_speed_mps: 0.0,
+    };
+    let likelihood =
+        place_fit(object, station.offset_m, width_m) * fit * share(object.class, LaneKind::Road);
+    Some(Candidate::new(on, likelihood))
 }
 
 /// By the directions a little before and after.

@@ -11,16 +11,14 @@ mod own;
 mod sight;
 mod site;
 
-use std::collections::BTreeMap;
-
 use crate::ego::Pose;
 use crate::ego::geodesy::Geodetic;
 use crate::parameter::{Text, parameters};
 use crate::roadmap::{Origin, Roadmap, Roundabout, roundabouts, simplified};
 use crate::time::Time;
 use crate::track::Object;
-use gap::{Asked, User};
-use lanes::Belief;
+use gap::{Asked, Users};
+use lanes::{Beliefs, Candidate};
 use own::{Own, standing};
 use sight::Unseen;
 use site::{Placing, Site};
@@ -91,13 +89,15 @@ pub struct Watcher {
     placing: Option<Placing>,
     /// The one that is watched, and what is remembered of it.
     watched: Option<usize>,
-    beliefs: BTreeMap<u32, Belief>,
+    beliefs: Beliefs,
     unseen: Unseen,
     last: Option<Time>,
+    /// When it began to be watched.
     since: Option<Time>,
     advice: Advice,
     /// Lanes of each object, reused.
     lanes: Vec<Vec<OnLane>>,
+    candidates: Vec<Candidate>,
 }
 
 impl Watcher {
@@ -110,12 +110,13 @@ impl Watcher {
             sites: vec![],
             placing: None,
             watched: None,
-            beliefs: BTreeMap::new(),
+            beliefs: Beliefs::default(),
             unseen: Unseen::default(),
             last: None,
             since: None,
             advice: Advice::default(),
             lanes: vec![],
+            candidates: vec![],
         }
     }
 
@@ -133,7 +134,7 @@ impl Watcher {
     pub fn forget(&mut self) {
         self.watched = None;
         self.advice.own_arm = None;
-        self.beliefs.clear();
+        self.beliefs.keep(|_| false);
         self.unseen = Unseen::default();
         self.last = None;
         self.since = None;
@@ -169,12 +170,15 @@ impl Watcher {
             self.unseen
                 .update(site, sight, situation.objects, passed_s, road_mps);
         }
-        self.lanes.resize_with(situation.objects.len(), Vec::new);
-        let mut beliefs = std::mem::take(&mut self.beliefs);
-        for (object, lanes) in situation.objects.iter().zip(&mut self.lanes) {
-            let mut belief = beliefs.remove(&object.id).unwrap_or_default();
-            belief.update(site, object, passed_s, lanes);
-            self.beliefs.insert(object.id, belief);
+        let objects = situation.objects;
+        let count = self.lanes.len().max(objects.len());
+        self.lanes.resize_with(count, Vec::new);
+        // Ids are the tracker's: nothing is remembered of who is not listed.
+        self.beliefs
+            .keep(|id| objects.iter().any(|object| object.id == id));
+        for (object, lanes) in objects.iter().zip(&mut self.lanes) {
+            let belief = self.beliefs.of(object.id);
+            belief.update(site, object, passed_s, &mut self.candidates, lanes);
         }
         self.advise(index, situation);
     }
@@ -224,15 +228,14 @@ impl Watcher {
         advice.users.clear();
         advice.windows.clear();
         advice.arms.clear();
-        let users: Vec<User<'_>> = situation
-            .objects
-            .iter()
-            .zip(&self.lanes)
-            .map(|(object, lanes)| User { object, lanes })
-            .collect();
-        advice.users.extend(users.iter().filter_map(UserOnLane::of));
+        let users = Users {
+            objects: situation.objects,
+            lanes: &self.lanes,
+        };
+        let on_lanes = users.iter().filter_map(UserOnLane::of);
+        advice.users.extend(on_lanes);
         for number in 0..site.arms.len() {
-            let arm = self.arm(site, number, &own, &users, situation, &mut advice.windows);
+            let arm = self.arm(site, number, &own, users, situation, &mut advice.windows);
             advice.arms.push(arm);
         }
         self.advice = advice;
@@ -244,7 +247,7 @@ impl Watcher {
         site: &Site,
         number: usize,
         own: &Own,
-        users: &[User<'_>],
+        users: Users<'_>,
         situation: &Situation<'_>,
         windows: &mut Vec<Window>,
     ) -> ArmAdvice {
@@ -265,7 +268,7 @@ impl Watcher {
         let first = windows.len();
         users
             .iter()
-            .for_each(|user| gap::windows(&asked, user, windows));
+            .for_each(|user| gap::windows(&asked, &user, windows));
         let unseen = situation.sight.map(|_| &self.unseen);
         let mut advice = ArmAdvice::of(
             &asked,

@@ -1,7 +1,7 @@
 //! Where the vehicle is on the site, and how it goes on.
 
 use super::advice::State;
-use super::gap::{OwnMotion, User};
+use super::gap::{OwnMotion, Users};
 use super::lanes::Place;
 use super::site::{Entry, Site};
 use super::{RoundaboutParameters, Situation};
@@ -118,7 +118,7 @@ impl Own {
 
 impl Own {
     /// Somebody who stands or goes before the vehicle on its own way in.
-    pub(super) fn ahead(&self, entry: &Entry, users: &[User<'_>]) -> Option<u32> {
+    pub(super) fn ahead(&self, entry: &Entry, users: Users<'_>) -> Option<u32> {
         let front_m = self.motion?.front_m;
         let ahead = users.iter().filter_map(|user| {
             let object = user.object;

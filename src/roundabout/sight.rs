@@ -1,4 +1,6 @@
 //! What of the circle is seen, and where somebody may be who was not.
+//!
+//! Numbers without another source were set with `scripts/evaluate-roundabouts --seeds 1-8`.
 
 use std::f64::consts::TAU;
 
@@ -32,8 +34,6 @@ pub struct Sight<'a> {
 const LOOK_M: f64 = 0.7;
 /// So near the vehicle is seen around, though its lowest rays pass above.
 const NEAR_M: f64 = 6.0;
-/// A ray that passes a place higher than this above the look passes over cars.
-const OVER_M: f64 = 0.8;
 /// A ray that ends nearer than this before a place is taken to have reached it.
 const SHORT_M: f64 = 1.0;
 /// And by this share of the range: low rays meet the ground before the place.
@@ -79,8 +79,7 @@ impl Sight<'_> {
         let near_m = out_m * (1.0 - SHORT_SHARE) - SHORT_M;
         let seen = [above.wrapping_sub(1), above]
             .into_iter()
-            .filter(|&layer| layer < layers)
-            .filter(|&layer| (self.scan.slope(layer).0 - tangent) * out_m < OVER_M);
+            .filter(|&layer| layer < layers);
         let reached = |layer: usize, after: isize| {
             let column = azimuths.column_beside(column, after).unwrap_or(column);
             let reached_m = self.scan.reached_m()[column * MAX_LAYERS + layer];
@@ -145,9 +144,6 @@ impl Unseen {
                 let at_m = ring.circle.at(angle_rad(site, place, count));
                 if sight.reaches(at_m) {
                     stretch.may_hold[place] = false;
-                } else if ring.kind == LaneKind::Road && is_mouth(site, at_m) {
-                    // Who comes out of an arm there is not seen either.
-                    stretch.may_hold[place] = true;
                 } else {
                     // Should he not be listed any more, he is still there.
                     stretch.may_hold[place] |= is_listed(objects, at_m);
@@ -194,14 +190,6 @@ impl Unseen {
     }
 }
 
-/// Whether a way in ends near a place.
-fn is_mouth(site: &Site, [x, y]: [f64; 2]) -> bool {
-    const NEAR_M: f64 = 4.0;
-    let entries = site.arms.iter().flat_map(|arm| &arm.entries);
-    let mut ends = entries.filter_map(|entry| entry.way.points_m().last());
-    ends.any(|end_m| libm::hypot(end_m[0] - x, end_m[1] - y) < NEAR_M)
-}
-
 fn is_listed(objects: &[Object], at_m: [f64; 2]) -> bool {
     objects.iter().any(|object| {
         let [x, y, _] = object.centre_m;
@@ -213,11 +201,20 @@ fn is_listed(objects: &[Object], at_m: [f64; 2]) -> bool {
 impl Stretch {
     /// One place further on; on foot one goes both ways.
     fn spread(&mut self, both_ways: bool) {
-        let before = self.may_hold.clone();
-        let count = before.len();
-        for (place, may_hold) in self.may_hold.iter_mut().enumerate() {
-            *may_hold |= before[(place + count - 1) % count];
-            *may_hold |= both_ways && before[(place + 1) % count];
+        let (Some(&first), Some(&last)) = (self.may_hold.first(), self.may_hold.last()) else {
+            return;
+        };
+        let count = self.may_hold.len();
+        for place in (1..count).rev() {
+            self.may_hold[place] |= self.may_hold[place - 1];
+        }
+        self.may_hold[0] |= last;
+        if both_ways {
+            // What came forward came from here: nobody goes two places back.
+            for place in 0..count - 1 {
+                self.may_hold[place] |= self.may_hold[place + 1];
+            }
+            self.may_hold[count - 1] |= first;
         }
     }
 }
