@@ -12,7 +12,7 @@ use crate::roadmap::{
 /// By the lane from which they lead.
 type Connectors<'a> = BTreeMap<LaneId, Vec<&'a Connector>>;
 
-/// A scenario with the map's roads; what [`mod@super::read`] makes of it has the same lanes,
+/// A scenario with the map's roads; what the reader makes of it has the same lanes,
 /// connectors and declared roundabouts. That a lane is circular is only in its road's name.
 pub fn write(map: &Roadmap) -> String {
     let mut out = Lines::default();
