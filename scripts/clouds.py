@@ -2,59 +2,21 @@
 
 import json
 import pathlib
-import struct
 import subprocess
 
 import numpy as np
 
+from envelopes import POINT_CLOUD, entries, fields
 from program import KREISEL
 
-POINT_CLOUD = 49
 ELEVATIONS = np.radians(np.arange(-15, 16, 2))
-
-
-def varint(data, at):
-    value = shift = 0
-    while True:
-        byte = data[at]
-        at += 1
-        value |= (byte & 0x7F) << shift
-        shift += 7
-        if byte < 0x80:
-            return value, at
-
-
-def fields(data):
-    """The fields of a message: number, value."""
-    at = 0
-    while at < len(data):
-        key, at = varint(data, at)
-        if key & 7 == 0:
-            value, at = varint(data, at)
-        elif key & 7 == 2:
-            length, at = varint(data, at)
-            value, at = data[at : at + length], at + length
-        else:
-            length, code = {1: (8, "<d"), 5: (4, "<f")}[key & 7]
-            value, at = struct.unpack(code, data[at : at + length])[0], at + length
-        yield key >> 3, value
-
-
-def envelopes(recording):
-    """Message number, payload and length in bytes of every envelope of a recording."""
-    at = 0
-    while at + 5 <= len(recording):
-        length = struct.unpack("<I", recording[at + 1 : at + 5])[0] >> 8
-        envelope = dict(fields(recording[at + 5 : at + 5 + length]))
-        at += 5 + length
-        yield envelope[1] >> 1, envelope[2], 5 + length
 
 
 def clouds(recording):
     """The point cloud messages of a recording, as dictionaries by field number."""
-    for kind, payload, _ in envelopes(recording):
-        if kind == POINT_CLOUD:
-            yield dict(fields(payload))
+    for entry in entries(recording):
+        if entry.kind == POINT_CLOUD:
+            yield dict(fields(entry.payload))
 
 
 def points(cloud, order):

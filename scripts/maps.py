@@ -9,7 +9,7 @@ import types
 import numpy as np
 from scipy.ndimage import binary_dilation, distance_transform_edt
 
-from clouds import envelopes, fields
+from envelopes import entries, fields, unzigzag
 from tiles import UNKNOWN, levels
 
 OBJECT_LIST, GRID_TILE = 2021, 2022
@@ -21,21 +21,17 @@ REACH_M = 50
 LEAST_WAY_M = 5
 
 
-def unzigzag(value):
-    return (value >> 1) ^ -(value & 1)
-
-
 def revolutions(recording):
     """For each object list of a recording, the tiles that follow it and the bytes that they take."""
     tiles, size = None, 0
-    for kind, payload, length in envelopes(recording):
-        if kind == OBJECT_LIST:
+    for entry in entries(recording):
+        if entry.kind == OBJECT_LIST:
             if tiles is not None:
                 yield tiles, size
             tiles, size = [], 0
-        elif kind == GRID_TILE and tiles is not None:
-            size += length
-            field = dict(fields(payload))
+        elif entry.kind == GRID_TILE and tiles is not None:
+            size += len(entry.frame)
+            field = dict(fields(entry.payload))
             place = (unzigzag(field[4]), unzigzag(field[5]))
             tiles.append((place, types.SimpleNamespace(cellsPerSide=field[6], cellSize=field[7], cells=field[10])))
     yield tiles, size

@@ -1,27 +1,17 @@
 //! What the benches share: the clock, the unit, a drive, and the pipeline's steps one by one.
 
+mod clock;
+
 use std::hint::black_box;
 use std::time::Duration;
 
+pub(crate) use clock::{cpu_time, quantiles};
 use kreisel::pipeline::{Outcome, Pipeline};
 use kreisel::simulate::{Simulation, scenario};
 use kreisel::time::Time;
 use kreisel::wire::envelope::Postmark;
 use kreisel::wire::point_cloud::{CompactPointCloud, POINT_CLOUD_ID};
 use kreisel::wire::{Envelope, Recording};
-
-/// CPU time of this thread: other processes do not count.
-pub(crate) fn cpu_time() -> Duration {
-    let clock = nix::time::ClockId::CLOCK_THREAD_CPUTIME_ID;
-    Duration::from(nix::time::clock_gettime(clock).unwrap())
-}
-
-/// Median and 99th percentile.
-pub(crate) fn quantiles(times_us: &mut [f64]) -> (f64, f64) {
-    times_us.sort_by(f64::total_cmp);
-    let count = times_us.len();
-    (times_us[count / 2], times_us[count * 99 / 100])
-}
 
 /// The unit in microseconds: distances to x, y, z with tables of sines and cosines, nothing else.
 pub(crate) fn plain_pass() -> f64 {

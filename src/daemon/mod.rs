@@ -86,8 +86,9 @@ pub enum DaemonError {
     Sensor(#[from] SensorError),
 }
 
-/// How often Status is sent.
-const STATUS_PERIOD: Duration = Duration::from_secs(1);
+/// How often the network is looked at, and in how many times of that Status is sent, once a second.
+const WATCH_PERIOD: Duration = Duration::from_millis(250);
+const WATCHES_PER_STATUS: u32 = 4;
 
 /// A shorter receive buffer is worth a warning.
 const COMFORTABLE_BUFFER_S: f64 = 2.0;
@@ -211,7 +212,8 @@ impl Service<'_> {
     async fn serve(&mut self) -> Result<Infallible, DaemonError> {
         let mut datagram = Datagram::default();
         let mut packet = Datagram::default();
-        let mut ticks = interval(STATUS_PERIOD);
+        let mut watches = 0;
+        let mut ticks = interval(WATCH_PERIOD);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
         ticks.tick().await;
         loop {
@@ -239,6 +241,10 @@ impl Service<'_> {
             self.worker.note_drops(&self.intake, &self.queue, counts);
             if is_due {
                 self.watch_network();
+                watches += 1;
+            }
+            if watches == WATCHES_PER_STATUS {
+                watches = 0;
                 self.watch_kernel();
                 let counts = self.sensor.as_ref().map(|sensor| &sensor.counts);
                 self.worker.send_status(&self.intake, &self.queue, counts);
