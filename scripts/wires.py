@@ -106,6 +106,16 @@ def checked(frame):
     return frame[:at] + b"\0\0" + frame[at + 2 :]
 
 
+# What README advises where packets are lost, and what a kernel does otherwise: how long it keeps fragments, and how many
+# bytes of them.
+ADVISED, STOCK = (1, 1 << 26), (30, 1 << 22)
+
+
+def keep_fragments(seconds, most_bytes):
+    settings = [f"net.ipv4.ipfrag_time={seconds}", f"net.ipv4.ipfrag_high_thresh={most_bytes}"]
+    subprocess.run(["ip", "netns", "exec", CAR, "sysctl", "-qw", *settings], check=True)
+
+
 def connect_car():
     """The car's interface, and the wire's end of it."""
     ip(f"link add to-car netns {WIRE} type veth peer name car0 netns {CAR}")
@@ -129,6 +139,7 @@ def hosts():
             ip(f"address add {address}/24 dev peer0", PEER)
         ip("link set peer0 up multicast on", PEER)
         connect_car()
+        keep_fragments(*ADVISED)
         wire = Wire()
         wire.start()
         try:

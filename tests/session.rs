@@ -283,6 +283,52 @@ fn the_daemon_ignores_what_it_sends_and_says_how_it_is() {
 
 #[test]
 #[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
+fn a_supervisor_hears_that_the_daemon_is_ready_alive_and_how_it_is() {
+    in_namespace(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("notify");
+        let supervisor = std::os::unix::net::UnixDatagram::bind(&path).unwrap();
+        supervisor
+            .set_read_timeout(Some(Duration::from_secs(5)))
+            .unwrap();
+        let socket = format!("NOTIFY_SOCKET={}", text(&path));
+        let kreisel = env!("CARGO_BIN_EXE_kreisel");
+        let daemon = Running::start(
+            "env",
+            &[
+                &socket,
+                kreisel,
+                "run",
+                "--cid=111",
+                "--interface=127.0.0.1",
+            ],
+        );
+        let mut buffer = [0; 200];
+        let mut hear = || {
+            let length = supervisor.recv(&mut buffer).unwrap();
+            String::from_utf8_lossy(&buffer[..length])
+                .trim_end()
+                .to_owned()
+        };
+        let mut until = |said: &str| {
+            let heard: Vec<String> = std::iter::repeat_with(&mut hear)
+                .take(20)
+                .take_while(|heard| !heard.starts_with(said))
+                .collect();
+            assert!(heard.len() < 20, "{said}: {heard:?}");
+            heard
+        };
+        assert!(until("READY=1").is_empty());
+        let before_status = until("STATUS=blind: ");
+        assert!((2..6).contains(&before_status.len()), "{before_status:?}");
+        assert!(before_status.iter().all(|heard| heard == "WATCHDOG=1"));
+        daemon.signal(Signal::SIGTERM);
+        until("STOPPING=1");
+    });
+}
+
+#[test]
+#[cfg_attr(not(network_namespaces), ignore = "needs root, for network namespaces")]
 fn a_recording_played_and_recorded_comes_back_byte_for_byte() {
     in_namespace(|| {
         let folder = tempfile::tempdir().unwrap();

@@ -205,7 +205,15 @@ fn a_machine_reads_counters_and_health() {
         "{metrics}"
     );
     assert_eq!(value("kreisel_revolutions_queue_dropped_total "), 0.0);
-    assert!(value("kreisel_latency_seconds{quantile=\"0.5\"} ") > 0.0);
+    assert!(value("kreisel_latency_quantile_seconds{quantile=\"0.5\"} ") > 0.0);
+    let count = value("kreisel_latency_seconds_count ");
+    assert!(count > 5.0);
+    for step in ["cloud", "ego", "ground", "cluster", "track", "map"] {
+        let own = value(&format!("kreisel_step_seconds_count{{step=\"{step}\"}} "));
+        assert!((own - count).abs() < 2.0, "{step}: {own} of {count}");
+    }
+    assert!(value("kreisel_received_bytes_total ") > 5.0 * 57_000.0);
+    assert!(value("kreisel_sent_bytes_total ") > 1000.0);
 }
 
 #[test]

@@ -21,6 +21,8 @@ const LONGEST_POSE: usize = 4096;
 #[derive(Debug, Default)]
 pub(super) struct Intake {
     pub(super) datagrams: u64,
+    /// Bytes of them.
+    pub(super) bytes: u64,
     pub(super) own: u64,
     pub(super) damaged: u64,
     pub(super) drops: Drops,
@@ -60,6 +62,7 @@ impl Intake {
     /// Counts a datagram and queues it if it means anything to the pipeline.
     pub(super) fn hear(&mut self, datagram: &mut Datagram, arrival: &Arrival, queue: &mut Queue) {
         self.datagrams += 1;
+        self.bytes += datagram.bytes().len() as u64;
         self.drops.note(arrival, "datagrams", &mut self.log);
         if arrival.is_own {
             self.own += 1;

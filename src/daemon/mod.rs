@@ -2,8 +2,8 @@
 //!
 //! `session` has the sockets of a session, `sensor` those of a sensor, both on a `listener`; `intake` sorts what comes,
 //! `queue` stands between it and `worker`, which owns the pipeline. `route` and `kernel` notice what goes wrong before a
-//! datagram reaches a socket, `health` says how all is, `telling` and `fault_log` write the log, `latency` keeps
-//! figures. Everything is bounded.
+//! datagram reaches a socket, `health` says how all is, `telling` and `fault_log` write the log, `supervisor` is who
+//! started the daemon, `latency` keeps figures. Everything is bounded.
 //!
 //! One thread does it all: while the pipeline works, the kernel's buffer takes what comes, and
 //! before the next revolution all of that goes into the queue. So nothing is locked, a
@@ -29,6 +29,8 @@ mod route;
 pub mod sensor;
 
 pub mod session;
+
+mod supervisor;
 
 mod telling;
 
@@ -133,6 +135,7 @@ pub async fn run(options: Options, stop: impl Future<Output = ()>) -> Result<(),
         sender_stamp: options.sender_stamp,
         view: options.view,
         not_sent: 0,
+        sent_bytes: 0,
     };
     let mut pipeline = Pipeline::new(&options.configuration, options.sender_stamp);
     if let Some(roads) = &options.roads {
@@ -165,12 +168,14 @@ pub async fn run(options: Options, stop: impl Future<Output = ()>) -> Result<(),
         kernel: KernelCounts::read(),
         vitals: &vitals,
     };
+    supervisor::ready();
     let cid = options.session.map_or(0, |session| session.cid);
     let result = tokio::select! {
         result = service.serve() => result.map(|never| match never {}),
         () = health::serve(cid, &vitals) => Ok(()),
         () = stop => Ok(()),
     };
+    supervisor::stopping();
     service.worker.log_latency();
     info!("stopped");
     result
@@ -240,6 +245,7 @@ impl Service<'_> {
             let counts = self.sensor.as_ref().map(|sensor| &sensor.counts);
             self.worker.note_drops(&self.intake, &self.queue, counts);
             if is_due {
+                supervisor::alive();
                 self.watch_network();
                 watches += 1;
             }

@@ -47,6 +47,8 @@ pub(super) struct SensorPorts {
 #[derive(Debug, Default)]
 pub(super) struct SensorCounts {
     pub(super) datagrams: u64,
+    /// Bytes of them.
+    pub(super) bytes: u64,
     pub(super) drops: Drops,
     pub(super) faults: Tally,
 }
@@ -103,7 +105,7 @@ impl SensorPorts {
         loop {
             let arrival = self.data.receive(datagram).await;
             let arrival = arrival.map_err(|error| self.lost(error))?;
-            if self.is_for_us(&arrival) {
+            if self.is_for_us(&arrival, datagram) {
                 return Ok(arrival);
             }
         }
@@ -120,7 +122,7 @@ impl SensorPorts {
         loop {
             let arrival = self.data.receive_waiting(datagram);
             let arrival = arrival.map_err(|error| self.lost(error))?;
-            if arrival.is_none_or(|arrival| self.is_for_us(&arrival)) {
+            if arrival.is_none_or(|arrival| self.is_for_us(&arrival, datagram)) {
                 return Ok(arrival);
             }
         }
@@ -129,7 +131,7 @@ impl SensorPorts {
     /// The next position packet if it has come already. They can be done without.
     pub(super) fn position_waiting(&mut self, datagram: &mut Datagram) -> Option<Arrival> {
         let arrival = self.position.as_mut()?.receive_waiting(datagram).ok()??;
-        self.is_for_us(&arrival).then_some(arrival)
+        self.is_for_us(&arrival, datagram).then_some(arrival)
     }
 
     fn lost(&self, error: io::Error) -> SensorError {
@@ -141,8 +143,9 @@ impl SensorPorts {
     }
 
     /// Counts a datagram, and says whether it comes from where it should.
-    fn is_for_us(&mut self, arrival: &Arrival) -> bool {
+    fn is_for_us(&mut self, arrival: &Arrival, datagram: &Datagram) -> bool {
         self.counts.datagrams += 1;
+        self.counts.bytes += datagram.bytes().len() as u64;
         self.counts
             .drops
             .note(arrival, "packets of the sensor", &mut self.log);

@@ -13,6 +13,7 @@ use super::now;
 use super::queue::{Job, Queue};
 use super::sensor::SensorCounts;
 use super::session::Sender;
+use super::supervisor;
 use super::telling::Teller;
 use crate::cloud::PacketRefusal;
 use crate::pipeline::{Fault, Outcome, Pipeline, RevolutionReport, Step};
@@ -62,6 +63,8 @@ pub(super) struct Output {
     pub(super) view: Option<Feed>,
     /// Frames that could not be sent.
     pub(super) not_sent: u64,
+    /// Bytes of those that were.
+    pub(super) sent_bytes: u64,
 }
 
 impl Output {
@@ -71,9 +74,13 @@ impl Output {
             if let Some(view) = &mut self.view {
                 view.put(frame);
             }
-            if let Some(Err(error)) = self.sender.as_ref().map(|sender| sender.send(frame)) {
-                self.not_sent += 1;
-                log.note("send", || error.to_string());
+            match self.sender.as_ref().map(|sender| sender.send(frame)) {
+                None => {}
+                Some(Ok(())) => self.sent_bytes += frame.len() as u64,
+                Some(Err(error)) => {
+                    self.not_sent += 1;
+                    log.note("send", || error.to_string());
+                }
             }
         }
     }
@@ -205,7 +212,11 @@ impl<'a> Worker<'a> {
         let processing_s = begin.elapsed().as_secs_f32();
         let frames = self.pipeline.publish_objects(now(), processing_s);
         self.output.send(frames, &mut self.log);
-        self.latency.record(now() - arrival);
+        let latency = now() - arrival;
+        self.latency.record(latency);
+        if let Some(view) = &mut self.output.view {
+            view.answered(latency);
+        }
         self.vitals.answered(report.missed);
         self.pipeline.update_map();
         let frames = self.pipeline.publish_map(now());
@@ -298,8 +309,11 @@ impl<'a> Worker<'a> {
         let health = self.vitals.verdict();
         status.healthy = health == Health::Well;
         status.health = health.to_string();
+        supervisor::well(&health);
         self.teller.tell_health(health);
         if let Some(view) = &mut self.output.view {
+            let received_bytes = intake.bytes + sensor.map_or(0, |sensor| sensor.bytes);
+            view.note_traffic(received_bytes, self.output.sent_bytes);
             view.tell(&status);
         }
         let sent = now();

@@ -8,11 +8,12 @@ use std::time::Instant;
 use axum::body::Bytes;
 use tokio::sync::watch;
 
+use super::measures::Measures;
 use super::metrics::Told;
 use super::newest::Newest;
 use super::picture::{Around, Painter, Player};
 use crate::pipeline::{Pipeline, RevolutionReport, Step};
-use crate::time::Time;
+use crate::time::{Span, Time};
 use crate::wire::Message;
 use crate::wire::envelope::Postmark;
 use crate::wire::status::Status;
@@ -25,14 +26,16 @@ pub(super) struct Shown {
     pub(super) bytes: Bytes,
 }
 
-/// The pipeline's end of the view. Without a viewer it costs a comparison a revolution.
+/// The pipeline's end of the view. Without a viewer it tells the time a dozen times a revolution.
 #[derive(Debug)]
 pub struct Feed {
     address: SocketAddr,
     shown: watch::Sender<Shown>,
     told: watch::Sender<Option<Told>>,
     painter: Painter,
+    /// When the step began that is under way.
     begun: Option<Instant>,
+    measures: Measures,
     steps_ms: Vec<(&'static str, f32)>,
     /// What was published since the last picture.
     frames: Vec<u8>,
@@ -60,6 +63,7 @@ impl Feed {
             told,
             painter: Painter::default(),
             begun: None,
+            measures: Measures::default(),
             steps_ms: vec![],
             frames: vec![],
             newest: Newest::default(),
@@ -83,6 +87,7 @@ impl Feed {
     pub fn tell(&mut self, status: &Status) {
         self.told.send_replace(Some(Told {
             status: status.clone(),
+            measures: self.measures.clone(),
             at: Instant::now(),
         }));
     }
@@ -90,16 +95,29 @@ impl Feed {
     /// A revolution begins.
     pub fn begin(&mut self) {
         self.steps_ms.clear();
-        self.begun = self.is_watched().then(Instant::now);
+        self.begun = Some(Instant::now());
     }
 
     /// A step of it is done.
     pub fn note(&mut self, step: Step) {
         let Some(begun) = &mut self.begun else { return };
         let now = Instant::now();
-        let took_ms = 1000.0 * now.duration_since(*begun).as_secs_f32();
-        self.steps_ms.push((step.name(), took_ms));
+        let took = now.duration_since(*begun);
+        self.measures.note(step, took);
+        self.steps_ms
+            .push((step.name(), 1000.0 * took.as_secs_f32()));
         *begun = now;
+    }
+
+    /// A revolution was answered so long after it had come.
+    pub fn answered(&mut self, latency: Span) {
+        self.measures.latency.record(latency.seconds().max(0.0));
+    }
+
+    /// Bytes of messages that came in and that were sent so far.
+    pub fn note_traffic(&mut self, received_bytes: u64, sent_bytes: u64) {
+        self.measures.received_bytes = received_bytes;
+        self.measures.sent_bytes = sent_bytes;
     }
 
     /// A frame was published, or came from a session; what is damaged or no list, Status or tile is left out.

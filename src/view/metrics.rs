@@ -3,12 +3,14 @@
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
+use super::measures::{BOUNDS_S, Durations, Measures};
 use crate::wire::status::Status;
 
 /// The latest Status, and when it was told.
 #[derive(Debug, Clone)]
 pub(super) struct Told {
     pub(super) status: Status,
+    pub(super) measures: Measures,
     pub(super) at: Instant,
 }
 
@@ -25,12 +27,35 @@ pub(super) fn health(told: Option<&Told>) -> Result<(), String> {
     }
 }
 
-/// Values of one name, each with its labels, of which most have none.
+/// Values of one name, each with what follows the name: a suffix, labels, or nothing.
 struct Family {
     name: &'static str,
     kind: &'static str,
     help: &'static str,
     values: Vec<(String, f64)>,
+}
+
+/// Lines of a histogram with labels of its own, which end with a comma if there are any.
+fn histogram(labels: &str, durations: &Durations) -> Vec<(String, f64)> {
+    let mut below = 0;
+    let buckets = BOUNDS_S.iter().zip(durations.buckets).map(|(bound, own)| {
+        below += own;
+        (format!("_bucket{{{labels}le=\"{bound}\"}}"), below as f64)
+    });
+    let own = labels.trim_end_matches(',');
+    let own = if own.is_empty() {
+        String::new()
+    } else {
+        format!("{{{own}}}")
+    };
+    let total = durations.count as f64;
+    buckets
+        .chain([
+            (format!("_bucket{{{labels}le=\"+Inf\"}}"), total),
+            (format!("_sum{own}"), durations.sum_s),
+            (format!("_count{own}"), total),
+        ])
+        .collect()
 }
 
 fn counter(name: &'static str, count: u64, help: &'static str) -> Family {
@@ -54,26 +79,59 @@ fn gauge(name: &'static str, value: impl Into<f64>, help: &'static str) -> Famil
     }
 }
 
-/// All that Status counts and measures.
-pub(super) fn text(status: &Status) -> String {
+/// All that is counted and measured.
+pub(super) fn text(told: &Told) -> String {
     let mut out = String::new();
     for Family {
         name,
         kind,
         help,
         values,
-    } in families(status)
+    } in families(&told.status)
+        .into_iter()
+        .chain(measured(&told.measures))
     {
         // Writing to a string never fails.
         let _ = writeln!(
             out,
             "# HELP kreisel_{name} {help}.\n# TYPE kreisel_{name} {kind}"
         );
-        for (labels, value) in values {
-            let _ = writeln!(out, "kreisel_{name}{labels} {value}");
+        for (more, value) in values {
+            let _ = writeln!(out, "kreisel_{name}{more} {value}");
         }
     }
     out
+}
+
+fn measured(measures: &Measures) -> Vec<Family> {
+    let steps = measures
+        .steps
+        .iter()
+        .flat_map(|(step, own)| histogram(&format!("step=\"{}\",", step.name()), own));
+    vec![
+        Family {
+            name: "latency_seconds",
+            kind: "histogram",
+            help: "Arrival of a revolution to its list sent",
+            values: histogram("", &measures.latency),
+        },
+        Family {
+            name: "step_seconds",
+            kind: "histogram",
+            help: "Each step of a revolution",
+            values: steps.collect(),
+        },
+        counter(
+            "received_bytes_total",
+            measures.received_bytes,
+            "Bytes of datagrams that came in",
+        ),
+        counter(
+            "sent_bytes_total",
+            measures.sent_bytes,
+            "Bytes of frames that were sent",
+        ),
+    ]
 }
 
 fn families(status: &Status) -> Vec<Family> {
@@ -227,7 +285,7 @@ fn families(status: &Status) -> Vec<Family> {
             "Arrival to list sent, since start",
         ),
         Family {
-            name: "latency_seconds",
+            name: "latency_quantile_seconds",
             kind: "gauge",
             help: "Arrival of a point cloud to its list sent, of the latest 6,000 to 12,000",
             values: vec![
@@ -248,6 +306,7 @@ fn families(status: &Status) -> Vec<Family> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pipeline::Step;
 
     #[test]
     fn every_line_is_a_comment_or_a_name_with_a_value() {
@@ -258,7 +317,15 @@ mod tests {
             version: "1".into(),
             ..Status::default()
         };
-        let text = text(&status);
+        let mut measures = Measures::default();
+        measures.latency.record(0.003);
+        measures.note(Step::Track, Duration::from_millis(30));
+        let at = Instant::now();
+        let text = text(&Told {
+            status,
+            measures,
+            at,
+        });
         for line in text.lines().filter(|line| !line.starts_with('#')) {
             let (name, value) = line.rsplit_once(' ').unwrap();
             assert!(
@@ -269,7 +336,13 @@ mod tests {
         for line in [
             "kreisel_revolutions_received_total 7",
             "kreisel_faults_total{fault=\"time_order\"} 3",
-            "kreisel_latency_seconds{quantile=\"0.99\"} 0.5",
+            "kreisel_latency_quantile_seconds{quantile=\"0.99\"} 0.5",
+            "kreisel_latency_seconds_bucket{le=\"0.002\"} 0",
+            "kreisel_latency_seconds_bucket{le=\"0.005\"} 1",
+            "kreisel_latency_seconds_bucket{le=\"+Inf\"} 1",
+            "kreisel_latency_seconds_count 1",
+            "kreisel_step_seconds_bucket{step=\"track\",le=\"0.05\"} 1",
+            "kreisel_step_seconds_sum{step=\"track\"} 0.03",
         ] {
             assert!(text.lines().any(|own| own == line), "{line}: {text}");
         }
@@ -282,6 +355,7 @@ mod tests {
                 healthy,
                 ..Status::default()
             },
+            measures: Measures::default(),
             at: Instant::now() - Duration::from_secs(seconds),
         };
         assert!(health(None).is_err());

@@ -247,9 +247,7 @@ fn router(served: Served) -> Router {
 /// What Prometheus asks for; nothing where no daemon tells its Status.
 async fn metrics(State(served): State<Served>) -> Response {
     let told = served.told.borrow().clone();
-    let text = told
-        .map(|told| metrics::text(&told.status))
-        .unwrap_or_default();
+    let text = told.map(|told| metrics::text(&told)).unwrap_or_default();
     ([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], text).into_response()
 }
 
