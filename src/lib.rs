@@ -98,6 +98,10 @@ pub mod daemon;
 #[cfg(feature = "shell")]
 pub mod view;
 
+// The same for other people's tools.
+#[cfg(feature = "foxglove")]
+pub mod foxglove;
+
 // One file a command.
 #[cfg(feature = "shell")]
 pub mod cli;

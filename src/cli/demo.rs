@@ -68,6 +68,7 @@ async fn demonstrate(arguments: &Arguments) -> Result<()> {
         sender_stamp: SENDER_STAMP,
         configuration,
         view,
+        onlooker: None,
     };
     let duration = arguments.duration.map(Duration::from_secs_f64);
     let stop = async {

@@ -36,6 +36,9 @@ mod labels;
 
 mod map;
 
+#[cfg(feature = "foxglove")]
+mod mcap;
+
 mod npz;
 
 mod objects;
@@ -102,7 +105,7 @@ enum Command {
     Process(process::Arguments),
     /// Make a recording of a synthetic VLP-16, with truth.
     Simulate(simulate::Arguments),
-    /// Turn captured VLP-16 packets (pcap, pcapng) into a recording.
+    /// Turn captured VLP-16 packets (pcap, pcapng) into a recording, or anything into MCAP.
     Convert(convert::Arguments),
     /// Show a recording or a session in a browser.
     View(view::Arguments),

@@ -9,7 +9,7 @@ use clap::Args;
 use super::{Completion, block_on, files, roads, stop_signal};
 use crate::daemon::sensor::SensorPort;
 use crate::daemon::session::Session;
-use crate::daemon::{self, Options};
+use crate::daemon::{self, Onlooker, Options};
 use crate::view::{self, DEFAULT_ADDRESS, Feed};
 
 #[derive(Debug, Args)]
@@ -44,6 +44,10 @@ pub(super) struct Arguments {
     /// Show what is seen in a browser, at this address [default: 127.0.0.1:8111].
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = DEFAULT_ADDRESS)]
     view: Option<SocketAddr>,
+    /// Show it in Foxglove or Lichtblick, at this address [default: 127.0.0.1:8765].
+    #[cfg(feature = "foxglove")]
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = crate::foxglove::DEFAULT_ADDRESS)]
+    foxglove: Option<SocketAddr>,
 }
 
 /// The port of data packets as the command line writes it.
@@ -67,6 +71,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
         sender_stamp: arguments.id,
         configuration,
         view: arguments.view.map(serve_view).transpose()?,
+        onlooker: onlooker(arguments)?,
     };
     block_on(async { Ok(daemon::run(options, stop_signal()).await?) })?;
     Ok(Completion::Done)
@@ -78,4 +83,23 @@ pub(super) fn serve_view(address: SocketAddr) -> Result<Feed> {
     let (feed, _) = served.with_context(|| format!("cannot serve the view at {address}"))?;
     tracing::info!("view: open http://{} in a browser", feed.address());
     Ok(feed)
+}
+
+#[cfg(not(feature = "foxglove"))]
+fn onlooker(_: &Arguments) -> Result<Option<Box<dyn Onlooker>>> {
+    Ok(None)
+}
+
+#[cfg(feature = "foxglove")]
+fn onlooker(arguments: &Arguments) -> Result<Option<Box<dyn Onlooker>>> {
+    let Some(address) = arguments.foxglove else {
+        return Ok(None);
+    };
+    let server = crate::foxglove::Server::start(address);
+    let server = server.with_context(|| format!("cannot serve Foxglove at {address}"))?;
+    tracing::info!(
+        "foxglove: open ws://{} in Foxglove or Lichtblick",
+        server.address()
+    );
+    Ok(Some(Box::new(server)))
 }

@@ -44,10 +44,11 @@ use tokio::time::{MissedTickBehavior, interval};
 use tracing::{info, warn};
 
 use crate::config::{Configuration, SessionParameters};
-use crate::pipeline::Pipeline;
+use crate::pipeline::{Pipeline, RevolutionReport};
 use crate::roadmap::Roadmap;
 use crate::time::Time;
 use crate::view::Feed;
+use crate::wire::status::Status;
 use health::Vitals;
 use intake::Intake;
 use kernel::KernelCounts;
@@ -57,6 +58,15 @@ use route::Route;
 use sensor::{SensorError, SensorPort, SensorPorts};
 use session::{Receiver, Session, SessionError};
 use worker::{Output, Worker};
+
+/// Somebody who is shown every revolution and every Status, and whom the daemon does not wait for.
+pub trait Onlooker: std::fmt::Debug {
+    /// A revolution was answered, and the map is up to date.
+    fn show(&mut self, pipeline: &Pipeline, report: &RevolutionReport);
+
+    /// How the daemon is.
+    fn tell(&mut self, status: &Status, now: Time);
+}
 
 /// What a user says on the command line about a daemon.
 #[derive(Debug)]
@@ -75,6 +85,8 @@ pub struct Options {
     pub configuration: Configuration,
     /// Where pictures go, if anybody may look.
     pub view: Option<Feed>,
+    /// Who else looks on.
+    pub onlooker: Option<Box<dyn Onlooker>>,
 }
 
 /// Why a daemon cannot run.
@@ -134,6 +146,7 @@ pub async fn run(options: Options, stop: impl Future<Output = ()>) -> Result<(),
         sender,
         sender_stamp: options.sender_stamp,
         view: options.view,
+        onlooker: options.onlooker,
         not_sent: 0,
         sent_bytes: 0,
     };

@@ -9,12 +9,12 @@ use super::health::{Health, Vitals};
 use super::intake::Intake;
 use super::latency::Latency;
 use super::listener::{Arrival, Datagram};
-use super::now;
 use super::queue::{Job, Queue};
 use super::sensor::SensorCounts;
 use super::session::Sender;
 use super::supervisor;
 use super::telling::Teller;
+use super::{Onlooker, now};
 use crate::cloud::PacketRefusal;
 use crate::pipeline::{Fault, Outcome, Pipeline, RevolutionReport, Step};
 use crate::tally::Tally;
@@ -61,6 +61,7 @@ pub(super) struct Output {
     pub(super) sender_stamp: u32,
     /// The view, if there is one.
     pub(super) view: Option<Feed>,
+    pub(super) onlooker: Option<Box<dyn Onlooker>>,
     /// Frames that could not be sent.
     pub(super) not_sent: u64,
     /// Bytes of those that were.
@@ -225,6 +226,9 @@ impl<'a> Worker<'a> {
             view.note(Step::Map);
             view.show(&self.pipeline, report, None);
         }
+        if let Some(onlooker) = &mut self.output.onlooker {
+            onlooker.show(&self.pipeline, report);
+        }
         self.teller
             .tell(report, self.pipeline.packets(), &mut self.log);
     }
@@ -317,6 +321,9 @@ impl<'a> Worker<'a> {
             view.tell(&status);
         }
         let sent = now();
+        if let Some(onlooker) = &mut self.output.onlooker {
+            onlooker.tell(&status, sent);
+        }
         let postmark = Postmark {
             sent,
             sampled: sent,

@@ -8,10 +8,11 @@ use std::time::Instant;
 use axum::body::Bytes;
 use tokio::sync::watch;
 
+use super::labels::Around;
 use super::measures::Measures;
 use super::metrics::Told;
 use super::newest::Newest;
-use super::picture::{Around, Painter, Player};
+use super::picture::{Painter, Player};
 use crate::pipeline::{Pipeline, RevolutionReport, Step};
 use crate::time::{Span, Time};
 use crate::wire::Message;
@@ -172,8 +173,8 @@ impl Feed {
         let came = self.came.load(Ordering::Acquire);
         self.needs_all |= std::mem::replace(&mut self.welcomed, came) != came;
         match known {
-            Some(pipeline) => self.painter.label(around, pipeline),
-            None => self.painter.label_none(around.scan),
+            Some(pipeline) => self.painter.labels.label(around, pipeline),
+            None => self.painter.labels.label_none(around.scan),
         }
         let mut bytes = vec![];
         self.painter

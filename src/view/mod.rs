@@ -1,6 +1,6 @@
 //! The picture in a browser: points, objects and map of the last revolution, for anybody who looks.
 //!
-//! `picture` has the bytes of a revolution for the page, `feed` makes them where somebody looks, with the `newest` of
+//! `labels` says what every point is, `picture` has the bytes of a revolution for the page, `feed` makes them where somebody looks, with the `newest` of
 //! what was published for those who have just come,
 //! `server` serves the page and sends them, `page/` is the page, and `metrics` is for those who watch a daemon by
 //! machine, with what `measures` keeps. The server has a thread of its
@@ -8,6 +8,8 @@
 //! misses pictures, and nothing else happens.
 
 mod feed;
+
+mod labels;
 
 mod measures;
 
@@ -20,5 +22,8 @@ mod picture;
 mod server;
 
 pub use feed::Feed;
-pub use picture::{Around, Player};
+pub use labels::Around;
+#[cfg(feature = "foxglove")]
+pub(crate) use labels::Labels;
+pub use picture::Player;
 pub use server::{Control, DEFAULT_ADDRESS, serve};

@@ -7,19 +7,8 @@
 
 use serde::Serialize;
 
-use crate::cloud::{MAX_LAYERS, Scan};
-use crate::ego::{Anchor, Placement, Pose};
-use crate::pipeline::Pipeline;
-use crate::track::Object;
+use super::labels::{Around, Labels};
 
-/// What a point is: ground.
-const GROUND: u8 = 0;
-/// Neither ground nor of a cluster.
-const LOOSE: u8 = 1;
-/// Of a cluster that is no object: this and the numbers up to [`FIRST_OBJECT`], in turn.
-const FIRST_CLUSTER: u8 = 2;
-/// Of an object: this and the number of its class.
-const FIRST_OBJECT: u8 = 128;
 /// Farther from the sensor along an axis than 16 bits of centimetres reach, metres.
 const FARTHEST_M: f64 = 327.0;
 
@@ -27,9 +16,6 @@ const FARTHEST_M: f64 = 327.0;
 const MOST_BYTES: usize = 154_000;
 /// Bytes of a point without its reflectivity.
 const POINT_BYTES: usize = 7;
-
-/// Returns so far outside of an object's box are taken for its own, metres: boxes are tight.
-const MARGIN_M: f64 = 0.3;
 
 /// Where a recording that is played is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -46,21 +32,6 @@ pub struct Player {
     pub run: u32,
 }
 
-/// A revolution as the picture needs it.
-#[derive(Debug, Clone, Copy)]
-pub struct Around<'a> {
-    /// Its points.
-    pub scan: &'a Scan,
-    /// How each column's points are placed in the odometry frame.
-    pub placements: &'a [Placement],
-    /// Where that lies in the local frame.
-    pub anchor: Anchor,
-    /// The sensor at the end of the sweep, in the local frame.
-    pub sensor: Pose,
-    /// How far below the sensor the ground is, metres.
-    pub ground_below_m: f64,
-}
-
 #[derive(Serialize)]
 struct Heading<'a> {
     origin_m: [f64; 3],
@@ -73,78 +44,13 @@ struct Heading<'a> {
 /// Makes pictures, one after the other.
 #[derive(Debug, Default)]
 pub(super) struct Painter {
-    kinds: Vec<u8>,
-    /// By how much the points of an object went on until the end of the sweep.
-    shifts_m: Vec<[f32; 2]>,
+    /// What the points are.
+    pub(super) labels: Labels,
     /// Places from the origin in centimetres, what is there, and its reflectivity.
     points: Vec<([i16; 3], u8, u8)>,
 }
 
 impl Painter {
-    /// Says of every point of the pipeline's last revolution what it is.
-    pub(super) fn label(&mut self, around: &Around<'_>, pipeline: &Pipeline) {
-        self.label_none(around.scan);
-        for (cluster, points) in pipeline.clusters().iter().enumerate() {
-            let kind = FIRST_CLUSTER + (cluster % usize::from(FIRST_OBJECT - FIRST_CLUSTER)) as u8;
-            for point in points {
-                self.kinds[*point as usize] = kind;
-            }
-        }
-        for object in pipeline.objects() {
-            let kind = FIRST_OBJECT + object.class.number() as u8;
-            self.label_object(around, object, kind);
-        }
-        let ground = pipeline.ground_mask();
-        for (kind, _) in self.kinds.iter_mut().zip(ground).filter(|(_, is)| **is) {
-            *kind = GROUND;
-        }
-    }
-
-    /// The same where nobody knows.
-    pub(super) fn label_none(&mut self, scan: &Scan) {
-        self.kinds.clear();
-        self.kinds.resize(scan.len(), LOOSE);
-        self.shifts_m.clear();
-        self.shifts_m.resize(scan.len(), [0.0; 2]);
-    }
-
-    /// Marks the points within an object's box, each where the box was at its time, and moves them to
-    /// where they are at the end of the sweep.
-    fn label_object(&mut self, around: &Around<'_>, object: &Object, kind: u8) {
-        let (sine, cosine) = libm::sincos(object.yaw_rad);
-        let half_m = [object.length_m, object.width_m].map(|side| 0.5 * side + MARGIN_M);
-        let [east, north, up] = object.centre_m;
-        let seen = around.sensor.placement().sensor_m([east, north]);
-        let scan = around.scan;
-        let age_s = scan.age_s(scan.column_at(libm::atan2(seen[0], seen[1])));
-        let shift_m = [cosine, sine].map(|part| part * object.speed_mps * age_s);
-        let corners_m =
-            [[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]].map(|[along, across]| {
-                let (along, across) = (along * half_m[0], across * half_m[1]);
-                around.sensor.placement().sensor_m([
-                    east - shift_m[0] + along * cosine - across * sine,
-                    north - shift_m[1] + along * sine + across * cosine,
-                ])
-            });
-        let height_m = 0.5 * object.height_m + MARGIN_M;
-        for column in scan.stretches_across(&corners_m).into_iter().flatten() {
-            for point in column * MAX_LAYERS..(column + 1) * MAX_LAYERS {
-                if !scan.has_return(point) {
-                    continue;
-                }
-                let [x, y, z] = around.place_m(point);
-                let (x, y) = (x - east + shift_m[0], y - north + shift_m[1]);
-                let is_within = libm::fabs(x * cosine + y * sine) < half_m[0]
-                    && libm::fabs(y * cosine - x * sine) < half_m[1]
-                    && libm::fabs(z - up) < height_m;
-                if is_within {
-                    self.kinds[point] = kind;
-                    self.shifts_m[point] = shift_m.map(|shift| shift as f32);
-                }
-            }
-        }
-    }
-
     /// Appends the heading and the points; what they are was said before.
     pub(super) fn paint(
         &mut self,
@@ -168,13 +74,12 @@ impl Painter {
         self.points.clear();
         let reflectivity = around.scan.reflectivity();
         for point in (0..around.scan.len()).filter(|point| around.scan.has_return(*point)) {
-            let (place_m, [dx, dy]) = (around.place_m(point), self.shifts_m[point].map(f64::from));
-            let [x, y, z] = [0, 1, 2].map(|axis| place_m[axis] - around.sensor.position_m[axis]);
-            let from_origin_m = [x + dx, y + dy, z];
+            let from_origin_m = self.labels.offset_m(around, point);
             if from_origin_m.iter().all(|metres| metres.abs() < FARTHEST_M) {
                 let centimetres = from_origin_m.map(|metres| (100.0 * metres) as i16);
                 let bright = reflectivity.get(point).copied().unwrap_or_default();
-                self.points.push((centimetres, self.kinds[point], bright));
+                self.points
+                    .push((centimetres, self.labels.kind(point), bright));
             }
         }
         let bytes = POINT_BYTES + usize::from(!reflectivity.is_empty());
@@ -192,28 +97,6 @@ impl Painter {
             put_length(out, points.len());
             out.extend(points.map(|(.., bright)| bright));
         }
-    }
-}
-
-impl<'a> Around<'a> {
-    /// The last revolution of a pipeline, which found the ground so far below the sensor.
-    pub(super) fn of(pipeline: &'a Pipeline, ground_below_m: f64) -> Self {
-        Self {
-            scan: pipeline.scan(),
-            placements: pipeline.placements(),
-            anchor: pipeline.sweep().anchor,
-            sensor: pipeline.sweep().local_sensor(),
-            ground_below_m,
-        }
-    }
-
-    /// Where a point lies in the local frame.
-    fn place_m(&self, point: usize) -> [f64; 3] {
-        let [x, y, z] = self.scan.point_m(point).map(f64::from);
-        let placement = &self.placements[self.scan.column(point)];
-        let [x, y] = placement.local_m([x, y]);
-        let [x, y, _] = self.anchor.place_m([x, y, 0.0]);
-        [x, y, self.sensor.position_m[2] + z]
     }
 }
 
@@ -253,8 +136,10 @@ pub(super) fn thinned(picture: &[u8]) -> Option<Vec<u8>> {
 mod tests {
     use super::*;
     use crate::config::Configuration;
-    use crate::pipeline::Outcome;
+    use crate::pipeline::{Outcome, Pipeline};
     use crate::simulate::{Simulation, scenario};
+    use crate::track::Object;
+    use crate::view::labels::{FIRST_OBJECT, LOOSE, MARGIN_M};
     use crate::wire::Recording;
 
     /// The picture of a simulated roundabout after 4 s.
@@ -312,7 +197,7 @@ mod tests {
         let (pipeline, ground_below_m) = roundabout();
         let around = Around::of(&pipeline, ground_below_m);
         let (mut painter, mut bytes) = (Painter::default(), vec![]);
-        painter.label(&around, &pipeline);
+        painter.labels.label(&around, &pipeline);
         painter.paint(&around, &[("cloud", 0.1)], None, &mut bytes);
         assert!(bytes.len() < 200_000, "{}", bytes.len());
         let picture = read(&bytes);
@@ -368,7 +253,7 @@ mod tests {
         }
         let around = Around::of(&pipeline, 1.9);
         let (mut painter, mut bytes) = (Painter::default(), vec![]);
-        painter.label_none(around.scan);
+        painter.labels.label_none(around.scan);
         painter.paint(&around, &[], None, &mut bytes);
         assert!(bytes.len() < 180_000, "{}", bytes.len());
         let (whole, thin) = (read(&bytes), read(&thinned(&bytes).unwrap()));
@@ -383,7 +268,7 @@ mod tests {
         let (pipeline, ground_below_m) = roundabout();
         let around = Around::of(&pipeline, ground_below_m);
         let (mut painter, mut bytes) = (Painter::default(), vec![]);
-        painter.label_none(around.scan);
+        painter.labels.label_none(around.scan);
         painter.paint(&around, &[], None, &mut bytes);
         bytes.extend_from_slice(b"frames");
         let (whole, thin) = (read(&bytes), read(&thinned(&bytes).unwrap()));
