@@ -7,6 +7,7 @@ mod common;
 use kreisel::config::Configuration;
 use kreisel::pipeline::{Counts, Fault, Outcome, Pipeline};
 use kreisel::random::Random;
+use kreisel::simulate::{Simulation, scenario};
 use kreisel::time::{Span, Time};
 use kreisel::wire::envelope::Postmark;
 use kreisel::wire::frame::HEADER_LEN;
@@ -15,7 +16,9 @@ use kreisel::wire::object_list::{Object, ObjectList};
 use kreisel::wire::point_cloud::{
     ByteOrder, CompactPointCloud, DistanceEncoding, IntensityPlacement, POINT_CLOUD_ID, Schema,
 };
+use kreisel::wire::pose::{ApplanixGroup1, GeodeticHeadingReading};
 use kreisel::wire::recording::{Damage, Entry};
+use kreisel::wire::status::Status;
 use kreisel::wire::{Envelope, Message, Recording};
 use std::collections::BTreeMap;
 
@@ -32,6 +35,16 @@ const AFTER_ANOTHER_SENDER: usize = 25;
 fn bytes(name: &str) -> Option<Vec<u8>> {
     let path = common::data(name)?;
     Some(std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display())))
+}
+
+/// A real recording; where there is none, what a simulated sensor that stands at a roundabout sends.
+fn recording() -> Vec<u8> {
+    bytes(REVOLUTIONS).unwrap_or_else(|| {
+        let scenario = scenario::find("roundabout-waiting").unwrap();
+        let (mut simulation, mut bytes) = (Simulation::new(scenario, 1), vec![]);
+        (0..4).for_each(|_| drop(simulation.revolve(&mut bytes)));
+        bytes
+    })
 }
 
 /// A pipeline with a good sender, and all that it answered.
@@ -184,27 +197,51 @@ fn good_payload(recording: &[u8]) -> Vec<u8> {
     entry.envelope.payload.to_vec()
 }
 
-fn golden_frames() -> Option<Vec<Vec<u8>>> {
-    let mut paths: Vec<_> = std::fs::read_dir(common::data("golden")?)
+/// Frames of all kinds as other peers send them; where these are not at hand, as Kreisel does.
+fn frames() -> Vec<Vec<u8>> {
+    let Some(folder) = common::data("golden") else {
+        return own_frames();
+    };
+    let mut paths: Vec<_> = std::fs::read_dir(folder)
         .unwrap()
         .map(|entry| entry.unwrap().path())
         .filter(|path| !path.to_string_lossy().ends_with(".payload.bin"))
         .collect();
     paths.sort();
-    Some(
-        paths
-            .iter()
-            .map(|path| std::fs::read(path).unwrap())
-            .collect(),
-    )
+    paths
+        .iter()
+        .map(|path| std::fs::read(path).unwrap())
+        .collect()
 }
 
-fn golden_clouds() -> Option<Vec<Vec<u8>>> {
+fn own_frames() -> Vec<Vec<u8>> {
+    fn framed(message: &impl Message) -> Vec<u8> {
+        let mut frame = vec![];
+        Postmark::default().put(&mut frame, message);
+        frame
+    }
+    let recording = recording();
+    let clouds = Recording::new(&recording).map(|entry| entry.unwrap().frame.to_vec());
+    let others = [
+        framed(&ObjectList::default()),
+        framed(&GridTile::default().with_cells(vec![0; 64])),
+        framed(&Status::default()),
+        framed(&ApplanixGroup1 {
+            lat: 57.7,
+            lon: 11.9,
+            ..ApplanixGroup1::default()
+        }),
+        framed(&GeodeticHeadingReading { north_heading: 1.0 }),
+    ];
+    clouds.chain(others).collect()
+}
+
+fn clouds() -> Vec<Vec<u8>> {
     let is_cloud = |frame: &Vec<u8>| {
         let (envelope, _) = Envelope::from_datagram(frame).unwrap();
         envelope.data_type == POINT_CLOUD_ID
     };
-    Some(golden_frames()?.into_iter().filter(is_cloud).collect())
+    frames().into_iter().filter(is_cloud).collect()
 }
 
 /// A damaged copy of `frame`; splices take their end from `other`.
@@ -253,12 +290,9 @@ fn insert(random: &mut Random, bytes: &mut Vec<u8>) {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn ten_thousand_mutations_are_counted_and_good_revolutions_between_them_answered() {
-    let Some(recording) = bytes(REVOLUTIONS) else {
-        return;
-    };
-    let golden = golden_frames().unwrap();
+    let recording = recording();
+    let golden = frames();
     let mut session = Session::new(good_payload(&recording));
     let mut random = Random::new(2024);
     let mut delays = vec![session.good_until_answered(1)];
@@ -284,10 +318,8 @@ fn ten_thousand_mutations_are_counted_and_good_revolutions_between_them_answered
 #[test]
 #[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_fault_costs_no_good_revolution_and_a_mutant_that_passes_at_most_one() {
-    let Some(recording) = bytes(REVOLUTIONS) else {
-        return;
-    };
-    let clouds = golden_clouds().unwrap();
+    let recording = recording();
+    let clouds = clouds();
     let mut session = Session::new(good_payload(&recording));
     let mut random = Random::new(4711);
     session.good_until_answered(1);
@@ -310,11 +342,8 @@ fn a_fault_costs_no_good_revolution_and_a_mutant_that_passes_at_most_one() {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_burst_of_mutants_delays_good_revolutions_by_a_few() {
-    let Some(recording) = bytes(REVOLUTIONS) else {
-        return;
-    };
+    let recording = recording();
     let mut session = Session::new(good_payload(&recording));
     let mut random = Random::new(99);
     session.good_until_answered(1);
@@ -331,11 +360,8 @@ fn a_burst_of_mutants_delays_good_revolutions_by_a_few() {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn bytes_of_no_meaning_do_no_harm_as_any_message() {
-    let Some(recording) = bytes(REVOLUTIONS) else {
-        return;
-    };
+    let recording = recording();
     let mut session = Session::new(good_payload(&recording));
     let mut random = Random::new(5);
     for data_type in [
@@ -354,11 +380,8 @@ fn bytes_of_no_meaning_do_no_harm_as_any_message() {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn another_sender_is_followed_after_twenty_refusals_and_the_first_welcome_back_at_once() {
-    let Some(recording) = bytes(REVOLUTIONS) else {
-        return;
-    };
+    let recording = recording();
     let mut session = Session::new(good_payload(&recording));
     assert!(session.send_good());
     let taken = (0..22).filter(|_| session.send_as(1).is_ok()).count();
@@ -369,11 +392,8 @@ fn another_sender_is_followed_after_twenty_refusals_and_the_first_welcome_back_a
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_hostile_first_sender_keeps_the_good_one_waiting_no_longer_than_its_patience() {
-    let Some(recording) = bytes(REVOLUTIONS) else {
-        return;
-    };
+    let recording = recording();
     let mut session = Session::new(good_payload(&recording));
     assert!(session.send_as(9).is_ok());
     assert_eq!(session.good_until_answered(AFTER_ANOTHER_SENDER), 21);
@@ -382,11 +402,8 @@ fn a_hostile_first_sender_keeps_the_good_one_waiting_no_longer_than_its_patience
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_refused_first_message_does_not_decide_who_is_listened_to() {
-    let Some(recording) = bytes(REVOLUTIONS) else {
-        return;
-    };
+    let recording = recording();
     let good = good_payload(&recording);
     let mut session = Session::new(with_end_azimuth(&good, 180.0));
     let refused = session.send_as(9).unwrap_err();
@@ -406,11 +423,8 @@ fn with_end_azimuth(payload: &[u8], end_azimuth_deg: f32) -> Vec<u8> {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_leap_in_time_costs_no_revolution() {
-    let Some(recording) = bytes(REVOLUTIONS) else {
-        return;
-    };
+    let recording = recording();
     let mut session = Session::new(good_payload(&recording));
     assert!(session.send_good());
     for hours in [1, -1] {
@@ -424,11 +438,8 @@ fn a_leap_in_time_costs_no_revolution() {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_sample_time_a_little_ahead_costs_one_revolution() {
-    let Some(recording) = bytes(REVOLUTIONS) else {
-        return;
-    };
+    let recording = recording();
     let mut session = Session::new(good_payload(&recording));
     assert!(session.send_good());
     for ahead_us in [150_000, 500_000, 999_000] {
@@ -441,11 +452,8 @@ fn a_sample_time_a_little_ahead_costs_one_revolution() {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_sample_time_that_a_later_revolution_shares_costs_one_revolution() {
-    let Some(recording) = bytes(REVOLUTIONS) else {
-        return;
-    };
+    let recording = recording();
     let mut session = Session::new(good_payload(&recording));
     assert!(session.send_good());
     assert!(session.send_ahead(Span::from_micros(200_000)).is_ok());
@@ -455,11 +463,8 @@ fn a_sample_time_that_a_later_revolution_shares_costs_one_revolution() {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn refused_point_clouds_leave_the_byte_order_as_it_was() {
-    let Some(recording) = bytes(REVOLUTIONS) else {
-        return;
-    };
+    let recording = recording();
     let good = good_payload(&recording);
     let mut session = Session::new(swapped_in_unknown_unit(&good));
     for _ in 0..5 {
@@ -490,11 +495,8 @@ fn swapped_in_unknown_unit(payload: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn wrong_azimuths_are_refused_once_and_right_ones_welcome_back_at_once() {
-    let Some(recording) = bytes(REVOLUTIONS) else {
-        return;
-    };
+    let recording = recording();
     let good = good_payload(&recording);
     let wrong = with_end_azimuth(&good, 353.0);
     let mut session = Session::new(good.clone());
@@ -580,11 +582,8 @@ fn end(entry: &Entry<'_>) -> usize {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_recording_after_a_cut_one_is_found_again_and_no_byte_is_lost() {
-    let Some(recording) = bytes(REVOLUTIONS) else {
-        return;
-    };
+    let recording = recording();
     let mut random = Random::new(8);
     let whole = entries(&items(&recording));
     for cut in cuts(&recording, &mut random, 60) {
@@ -618,11 +617,8 @@ fn tiled_len(items: &Items<'_>) -> usize {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_mutated_recording_is_walked_to_its_end_without_gaps() {
-    let Some(golden) = golden_frames() else {
-        return;
-    };
+    let golden = frames();
     let recording = golden.concat();
     let mut random = Random::new(77);
     for _ in 0..2000 {
@@ -634,9 +630,7 @@ fn a_mutated_recording_is_walked_to_its_end_without_gaps() {
 #[test]
 #[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn a_recording_that_follows_itself_loses_its_first_whole_revolution() {
-    let Some(recording) = bytes(REVOLUTIONS) else {
-        return;
-    };
+    let recording = recording();
     let mut session = Session::new(good_payload(&recording));
     for entry in items(&recording.repeat(2)) {
         let _ = session.handle(&entry.unwrap().envelope);
@@ -651,11 +645,8 @@ fn a_recording_that_follows_itself_loses_its_first_whole_revolution() {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs ../shared/data")]
 fn cut_recordings_end_to_end_do_no_harm_to_the_pipeline() {
-    let Some(recording) = bytes(REVOLUTIONS) else {
-        return;
-    };
+    let recording = recording();
     let mut session = Session::new(good_payload(&recording));
     let mut random = Random::new(15);
     for _ in 0..40 {
