@@ -57,7 +57,7 @@ const ROUNDABOUT: &str = "roundabout-traffic";
 type Distance = fn(u32) -> u32;
 
 /// Distances in centimetres of 2,000 columns of 16 returns that cost much, by the number of the return.
-const COSTLY: [(&str, Distance); 4] = [
+const COSTLY: [(&str, Distance); 7] = [
     // Returns at all distances, none of them ground.
     ("worst", |n| match n % 16 {
         layer if layer < 8 => 100 + layer,
@@ -75,6 +75,30 @@ const COSTLY: [(&str, Distance); 4] = [
     }),
     // A spiral: every column is a little farther than the one before.
     ("spiral", |n| 150 + n / 16 % 2000),
+    // Drops on one ray of thirty, up to 15 m away.
+    ("rain", |n| {
+        if mixed(n).is_multiple_of(30) {
+            100 + mixed(n) / 30 % 1400
+        } else {
+            2500
+        }
+    }),
+    // Squares at 8 and 14 m in turn.
+    ("checkerboard", |n| {
+        if (n / 64 + n % 16).is_multiple_of(2) {
+            800
+        } else {
+            1400
+        }
+    }),
+    // Posts 6 m away, half a metre apart, that move on by a column a revolution.
+    ("posts", |n| {
+        if (n / 16 + n / 32_000) % 26 < 6 {
+            600
+        } else {
+            3000
+        }
+    }),
 ];
 
 /// A number of which nothing is left of what it was.

@@ -1,5 +1,7 @@
 //! Last step: objects become messages, and messages the frames that are sent.
 
+mod other_sets;
+
 mod roundabout;
 
 use crate::ego::{Pose, Sweep};
@@ -9,11 +11,11 @@ use crate::roundabout::Advice;
 use crate::time::{Span, Time};
 use crate::track::Object;
 use crate::wire::envelope::Postmark;
-use crate::wire::environment::{Direction, Environment, PerceivedObject};
 use crate::wire::message::List;
 use crate::wire::object_list::ObjectList;
 use crate::wire::roundabout::Roundabout;
-use crate::wire::{Message, TimeStamp, object_list, opendlv};
+use crate::wire::{Message, object_list};
+use other_sets::{Sight, environment_of};
 
 choices! {
     /// Unit of angles in OpenDLV's object messages.
@@ -33,6 +35,8 @@ parameters! {
         /// Objects in a list. Of more, the nearest are kept, and the list says how many were
         /// left out; 400 fill one datagram.
         most_objects: usize = 256, in 1..=400, "objects";
+        /// kreisel.Object 2020: each object of the list by itself as well, for tools that read plain fields alone.
+        single_objects: bool = true, thesis false, "";
         /// OpenDLV's object messages 1128 to 1136, several for each object.
         opendlv: bool = false, "";
         /// Unit of ObjectDirection and ObjectAngularBlob. The message set says SI, existing
@@ -116,6 +120,12 @@ impl Publisher {
             let mut list = std::mem::take(&mut self.list);
             fill_list(&mut list, heading, &kept, objects.len() - kept.len());
             self.put(&postmark, &list);
+            if self.parameters.single_objects {
+                list.objects
+                    .0
+                    .iter()
+                    .for_each(|one| self.put(&postmark, one));
+            }
             self.list = list;
         }
         if self.parameters.opendlv {
@@ -163,53 +173,6 @@ impl Publisher {
     fn put<M: Message>(&mut self, postmark: &Postmark, message: &M) {
         postmark.put(&mut self.bytes, message);
         self.ends.push(self.bytes.len());
-    }
-
-    fn put_opendlv(&mut self, postmark: &Postmark, heading: &Heading<'_>, objects: &[Object]) {
-        let object_frame_id = heading.revolution;
-        self.put(postmark, &opendlv::ObjectFrameStart { object_frame_id });
-        let unit = match self.parameters.opendlv_angles {
-            AngleUnit::Degrees => 1f64.to_degrees(),
-            AngleUnit::Radians => 1.0,
-        };
-        for object in objects {
-            let (object_id, sight) = (object.id, Sight::of(object, &heading.sweep.local_sensor()));
-            let [x, y, z] = sight.position_m.map(|metres| metres as f32);
-            self.put(postmark, &opendlv::ObjectAnnouncement { object_id });
-            self.put(
-                postmark,
-                &opendlv::ObjectType {
-                    object_id,
-                    kind: object.class.number(),
-                },
-            );
-            self.put(
-                postmark,
-                &opendlv::ObjectDirection {
-                    object_id,
-                    azimuth_angle: (sight.azimuth_rad * unit) as f32,
-                    zenith_angle: (sight.zenith_rad * unit) as f32,
-                },
-            );
-            let distance = sight.distance_m as f32;
-            self.put(
-                postmark,
-                &opendlv::ObjectDistance {
-                    object_id,
-                    distance,
-                },
-            );
-            self.put(
-                postmark,
-                &opendlv::ObjectAngularBlob {
-                    object_id,
-                    width: (sight.width_rad * unit) as f32,
-                    height: (sight.height_rad * unit) as f32,
-                },
-            );
-            self.put(postmark, &opendlv::ObjectPosition { object_id, x, y, z });
-        }
-        self.put(postmark, &opendlv::ObjectFrameEnd { object_frame_id });
     }
 }
 
@@ -271,68 +234,6 @@ fn fill_list(list: &mut ObjectList, heading: &Heading<'_>, objects: &[Object], o
         reference_latitude: reference.map_or(0.0, |place| place.latitude_deg),
         reference_longitude: reference.map_or(0.0, |place| place.longitude_deg),
     };
-}
-
-fn environment_of(valid_until: Time, objects: &[Object], sensor: &Pose) -> Environment {
-    let message = |object: &Object| {
-        let sight = Sight::of(object, sensor);
-        PerceivedObject {
-            identified: TimeStamp::from(object.first_seen),
-            kind: object.class.name().into(),
-            direction: Direction {
-                azimuth: sight.azimuth_rad as f32,
-                zenith: sight.zenith_rad as f32,
-            },
-            direction_confidence: object.existence as f32,
-            distance: sight.distance_m as f32,
-            distance_confidence: object.existence as f32,
-            angular_size: sight.width_rad as f32,
-            angular_size_confidence: object.existence as f32,
-            confidence: object.existence as f32,
-            sources: List(vec!["lidar".into()]),
-            object_id: object.id as i16,
-            ..PerceivedObject::default()
-        }
-    };
-    Environment {
-        valid_until: TimeStamp::from(valid_until),
-        objects: List(objects.iter().map(message).collect()),
-    }
-}
-
-/// An object as seen from the sensor, which looks along y.
-struct Sight {
-    /// In the sensor frame.
-    position_m: [f64; 3],
-    azimuth_rad: f64,
-    zenith_rad: f64,
-    distance_m: f64,
-    width_rad: f64,
-    height_rad: f64,
-}
-
-impl Sight {
-    fn of(object: &Object, sensor: &Pose) -> Self {
-        let [east_m, north_m, up_m] = object.centre_m;
-        let [x, y] = sensor.placement().sensor_m([east_m, north_m]);
-        let z = up_m - sensor.position_m[2];
-        let horizontal_m = libm::hypot(x, y);
-        let distance_m = libm::hypot(horizontal_m, z);
-        // How wide the box appears: its shadow across the line of sight.
-        let [sensor_x, sensor_y, _] = sensor.position_m;
-        let turn_rad = object.yaw_rad - libm::atan2(north_m - sensor_y, east_m - sensor_x);
-        let across_m = object.length_m * libm::fabs(libm::sin(turn_rad))
-            + object.width_m * libm::fabs(libm::cos(turn_rad));
-        let seen_under = |size_m: f64| 2.0 * libm::atan2(0.5 * size_m, distance_m.max(0.1));
-        Self {
-            position_m: [x, y, z],
-            azimuth_rad: libm::atan2(-x, y),
-            zenith_rad: libm::atan2(z, horizontal_m),
-            distance_m,
-            width_rad: seen_under(across_m),
-            height_rad: seen_under(object.height_m),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -412,7 +313,7 @@ mod tests {
         };
         let objects = [object(1, 1.0, 2.0), object(2, 3.0, 4.0)];
         let each = [1130, 1131, 1133, 1134, 1135, 1136];
-        let expected = [&[2021, 1128][..], &each, &each, &[1129, 189]].concat();
+        let expected = [&[2021, 2020, 2020, 1128][..], &each, &each, &[1129, 189]].concat();
         assert_eq!(ids(&publish(all, &objects)), expected);
     }
 

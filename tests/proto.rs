@@ -2,9 +2,14 @@
 //! by an independent protobuf implementation from `proto/kreisel.proto`.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use kreisel::wire::environment::Environment;
 use kreisel::wire::grid_tile::{GridTile, encode_cells};
 use kreisel::wire::message::List;
 use kreisel::wire::object_list::{Object, ObjectList};
+use kreisel::wire::opendlv::{
+    ObjectAngularBlob, ObjectAnnouncement, ObjectDirection, ObjectDistance, ObjectFrameEnd,
+    ObjectFrameStart, ObjectPosition, ObjectType,
+};
 use kreisel::wire::roundabout::{
     ConflictWindow, LaneUser, Roundabout, RoundaboutArm, RoundaboutRing,
 };
@@ -16,7 +21,10 @@ use prost_reflect::{DescriptorPool, DynamicMessage, Value};
 type Described = (String, i32, Vec<(u32, String, String)>);
 
 fn odvd_messages() -> Vec<Described> {
-    let text = include_str!("../proto/kreisel.odvd");
+    messages_of(include_str!("../proto/kreisel.odvd"))
+}
+
+fn messages_of(text: &str) -> Vec<Described> {
     let mut messages: Vec<Described> = vec![];
     let number = |line: &str| -> String {
         let from = line.find("id = ").unwrap() + 5;
@@ -60,6 +68,34 @@ fn the_odvd_lists_every_field_of_every_message_that_is_published() {
         table::<Roundabout>(),
     ];
     assert_eq!(odvd_messages(), expected);
+}
+
+#[test]
+fn the_odvd_of_the_opendlv_set_lists_every_field_of_every_message_of_it_that_is_published() {
+    let expected = [
+        table::<ObjectFrameStart>(),
+        table::<ObjectFrameEnd>(),
+        table::<ObjectAnnouncement>(),
+        table::<ObjectType>(),
+        table::<ObjectDirection>(),
+        table::<ObjectDistance>(),
+        table::<ObjectAngularBlob>(),
+        table::<ObjectPosition>(),
+        table::<Environment>(),
+    ];
+    // The set's own names are not ours, and what is a message within one is bytes to its tools.
+    let places = |messages: Vec<Described>| -> Vec<_> {
+        let without_names = |(name, id, fields): Described| {
+            let kinds = fields.into_iter().map(|(number, _, kind)| {
+                let is_message = kind.contains('.');
+                (number, if is_message { "bytes".into() } else { kind })
+            });
+            (name, id, kinds.collect::<Vec<_>>())
+        };
+        messages.into_iter().map(without_names).collect()
+    };
+    let found = messages_of(include_str!("../proto/opendlv.odvd"));
+    assert_eq!(places(found), places(expected.into()));
 }
 
 fn pool() -> DescriptorPool {

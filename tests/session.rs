@@ -61,9 +61,18 @@ fn what_libcluon_replays_is_answered_and_libcluon_decodes_the_answer() {
         return;
     }
     in_namespace(|| {
-        let _daemon = Running::daemon(&["--id=7"]);
-        let odvd = concat!("--odvd=", env!("CARGO_MANIFEST_DIR"), "/proto/kreisel.odvd");
-        let listener = Running::start("cluon-OD4toJSON", &["--cid=111", odvd]);
+        let folder = tempfile::tempdir().unwrap();
+        let [config, odvd] = ["all.toml", "all.odvd"].map(|name| folder.path().join(name));
+        std::fs::write(&config, "[publish]\nopendlv = true\nenvironment = true\n").unwrap();
+        let all = [
+            include_str!("../proto/kreisel.odvd"),
+            include_str!("../proto/opendlv.odvd"),
+        ];
+        std::fs::write(&odvd, all.concat()).unwrap();
+        let config = format!("--config={}", text(&config));
+        let _daemon = Running::daemon(&["--id=7", &config]);
+        let odvd = format!("--odvd={}", text(&odvd));
+        let listener = Running::start("cluon-OD4toJSON", &["--cid=111", &odvd]);
         let peer = Peer::join();
         // Both have joined once a Status has gone out.
         peer.await_message::<Status>(|_| true);
@@ -77,7 +86,15 @@ fn what_libcluon_replays_is_answered_and_libcluon_decodes_the_answer() {
         drop(player);
         std::thread::sleep(Duration::from_millis(300));
         let (_, json, _) = listener.stop();
-        assert!(json.contains("Parsed 9 message(s)."), "{json:.200}");
+        assert!(json.contains("Parsed 18 message(s)."), "{json:.200}");
+        for message in [
+            "\"kreisel_Object\":{\"objectId\":",
+            "\"opendlv_logic_perception_ObjectFrameEnd\":{\"objectFrameId\":2}",
+            "\"opendlv_logic_perception_ObjectPosition\":{\"objectId\":",
+            "\"opendlv_perception_Environment\":{\"validUntil\":",
+        ] {
+            assert!(json.contains(message), "{message}");
+        }
         assert_eq!(
             json.matches("\"kreisel_ObjectList\":{\"revolution\":")
                 .count(),
