@@ -48,6 +48,10 @@ const APART: Span = Span::from_micros(480_000);
 /// knows when: what is 40 m away may be placed a metre off.
 const STEADY_RAD: f64 = 0.025;
 
+/// In which columns of the images the last place was looked up: the next one lies beside it, mostly.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Hints([Option<usize>; MOST_IMAGES]);
+
 impl Beams {
     /// Forgets everything.
     pub fn reset(&mut self) {
@@ -105,17 +109,22 @@ impl Beams {
         epoch: u32,
         at_m: &Vector3<f64>,
         azimuth_rad: f64,
+        hints: &mut Hints,
         is_own: impl Fn(usize) -> bool,
     ) -> Seen {
         if epoch != self.epoch || !self.is_steady {
             return Seen::Unknown;
         }
-        let look = |image: &RangeImage| image.seen(at_m, image.guess(azimuth_rad, self.yaw_rad));
-        for (number, image) in self.images.iter().enumerate() {
-            match look(image) {
+        let mut look = |number: usize| {
+            let image = &self.images[number];
+            let guess = || image.guess(azimuth_rad, self.yaw_rad);
+            image.seen(at_m, hints.0[number].get_or_insert_with(guess))
+        };
+        for number in 0..self.images.len() {
+            match look(number) {
                 Seen::Empty => return Seen::Empty,
                 Seen::Occupied if !is_own(number) => {
-                    let is_left = self.images.last().map(look) == Some(Seen::Empty);
+                    let is_left = look(self.images.len() - 1) == Seen::Empty;
                     return if is_left {
                         Seen::Unknown
                     } else {
@@ -173,7 +182,7 @@ mod tests {
 
     fn seen(beams: &Beams, at_m: Vector3<f64>) -> Seen {
         let azimuth_rad = libm::atan2(at_m.x, at_m.y);
-        beams.seen(0, &at_m, azimuth_rad, |_| false)
+        beams.seen(0, &at_m, azimuth_rad, &mut Hints::default(), |_| false)
     }
 
     #[test]
@@ -245,9 +254,12 @@ mod tests {
     fn what_is_there_now_is_left_out_of_what_was_seen() {
         let beams = beams(&wall(), false, &Pose::SENSOR);
         let at_m = place(20.0, 20.0);
-        assert_eq!(beams.seen(0, &at_m, 0.3, |image| image == 0), Seen::Unknown);
         assert_eq!(
-            beams.seen(0, &at_m, 0.3, |image| image == 1),
+            beams.seen(0, &at_m, 0.3, &mut Hints::default(), |image| image == 0),
+            Seen::Unknown
+        );
+        assert_eq!(
+            beams.seen(0, &at_m, 0.3, &mut Hints::default(), |image| image == 1),
             Seen::Occupied
         );
     }
@@ -300,7 +312,7 @@ mod tests {
         assert_eq!(seen(&beams, place(10.0, 20.0)), Seen::Unknown);
         assert_eq!(seen(&beams, place(5.0, 20.0)), Seen::Empty);
         assert_eq!(
-            beams.seen(1, &place(5.0, 20.0), 0.3, |_| false),
+            beams.seen(1, &place(5.0, 20.0), 0.3, &mut Hints::default(), |_| false),
             Seen::Unknown
         );
     }
@@ -333,11 +345,11 @@ mod tests {
         let nearer = scan_of(COLUMNS, |column, _| if column < 200 { 1000 } else { 0 });
         beams.remember(&later(&nearer, 4.0), &ground, &[], &other, &placements);
         assert_eq!(
-            beams.seen(1, &place(20.0, 20.0), 0.3, |_| false),
+            beams.seen(1, &place(20.0, 20.0), 0.3, &mut Hints::default(), |_| false),
             Seen::Unknown
         );
         assert_eq!(
-            beams.seen(1, &place(10.0, 20.0), 0.3, |_| false),
+            beams.seen(1, &place(10.0, 20.0), 0.3, &mut Hints::default(), |_| false),
             Seen::Occupied
         );
     }

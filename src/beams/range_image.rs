@@ -26,6 +26,7 @@ pub(super) struct RangeImage {
     /// Height of the sensor, and the turn from its axes to level ones.
     z_m: f64,
     tilt: Matrix3<f64>,
+    columns_per_rad: f64,
     /// Tangents of the layers' elevations, ascending, and how many layers there are.
     tangents: [f64; MAX_LAYERS],
     layers: usize,
@@ -93,7 +94,14 @@ impl RangeImage {
         };
         self.tilt = level.rigid().rotation.transpose() * sweep.attitude.rotation;
         self.layers = scan.sensor().elevation_deg.len();
-        self.tangents = std::array::from_fn(|layer| scan.slope(layer).0);
+        self.tangents = std::array::from_fn(|layer| {
+            if layer < self.layers {
+                scan.slope(layer).0
+            } else {
+                f64::INFINITY
+            }
+        });
+        self.columns_per_rad = 1.0 / self.azimuths.step_rad();
     }
 
     /// The column that looked where another azimuth points now, of a sensor that looks `yaw_rad`.
@@ -120,18 +128,22 @@ impl RangeImage {
         }
     }
 
-    /// What was seen of a place in the odometry frame, by about the column that is guessed.
-    pub(super) fn seen(&self, at_m: &Vector3<f64>, guess: usize) -> Seen {
+    /// What was seen of a place in the odometry frame, by about the column that is guessed, which gives way to the one
+    /// that looked there.
+    pub(super) fn seen(&self, at_m: &Vector3<f64>, guess: &mut usize) -> Seen {
         if self.range_m.is_empty() {
             return Seen::Unknown;
         }
-        let Some((column, from_m)) = self.find(at_m, guess) else {
+        let Some((column, from_m)) = self.find(at_m, *guess) else {
             return Seen::Unknown;
         };
+        *guess = column;
         let square_m2 = from_m.x * from_m.x + from_m.y * from_m.y;
         let tangent = from_m.z / square_m2.sqrt();
-        let tangents = &self.tangents[..self.layers];
-        let above = tangents.partition_point(|own| *own <= tangent);
+        // Those beyond the last layer are infinite. Counting all takes less than searching.
+        let below = self.tangents.iter().map(|own| usize::from(*own <= tangent));
+        let above: usize = below.sum();
+        let tangents = &self.tangents;
         if above == 0 || above == self.layers {
             return Seen::Unknown;
         }
@@ -173,7 +185,8 @@ impl RangeImage {
             if ahead_m > 0.0 && aside.abs() < NEAR {
                 // The arc tangent, to 2e-6.
                 let turn_rad = aside - aside * aside * aside / 3.0;
-                let after = libm::round(turn_rad / self.azimuths.step_rad()) as isize;
+                let after = turn_rad * self.columns_per_rad;
+                let after = (after + libm::copysign(0.5, after)) as isize;
                 let column = self.azimuths.column_beside(column, after)?;
                 return Some((column, from_m));
             }

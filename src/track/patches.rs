@@ -8,7 +8,7 @@ use super::placing::{Bounds, Placed, Placing};
 use super::spots::seen_before;
 use super::thinning::Thinning;
 use super::{Scene, TrackParameters, people};
-use crate::beams::Seen;
+use crate::beams::{Hints, Seen};
 use crate::cluster::Clusters;
 
 /// A cluster, or a part of one.
@@ -140,13 +140,14 @@ impl Placer {
 
     /// Looks up what was in the place of every return before. What moves may have been there itself.
     fn look_back(&mut self, forecasts: &mut Forecasts, scene: &Scene<'_>) {
+        let mut hints = Hints::default();
         for patch in &self.patches {
             self.near.clear();
             self.near.extend(forecasts.near(patch));
             self.near.retain(|track| forecasts.of(*track).moves());
             for placed in &mut self.placed[patch.begin..patch.end] {
                 let at_m = placed.at_m;
-                placed.before = seen_before(scene, placed.point, at_m, |image| {
+                placed.before = seen_before(scene, placed.point, at_m, &mut hints, |image| {
                     let was_there = |track: &usize| forecasts.of(*track).reached(at_m, image);
                     self.near.iter().any(was_there)
                 });

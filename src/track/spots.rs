@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::Scene;
-use crate::beams::Seen;
+use crate::beams::{Hints, Seen};
 use crate::float::{greatest, least};
 
 /// One return.
@@ -46,17 +46,18 @@ pub(super) fn seen_before(
     scene: &Scene<'_>,
     point: u32,
     at_m: [f32; 2],
+    hints: &mut Hints,
     is_own: impl Fn(usize) -> bool,
 ) -> Seen {
     let attitude = &scene.sweep.attitude;
     let point_m = Vector3::from(scene.scan.point_m(point as usize)).map(f64::from);
     let [x, y, _] = scene.sweep.sensor.position_m;
-    let z_m = attitude.place(&point_m).z;
+    let z_m = attitude.rotation.row(2).tr_dot(&point_m) + attitude.translation_m.z;
     let at_m = Vector3::new(x + f64::from(at_m[0]), y + f64::from(at_m[1]), z_m);
     let azimuth_rad = scene.scan.azimuth_rad(scene.scan.column(point as usize));
     scene
         .beams
-        .seen(scene.sweep.epoch, &at_m, azimuth_rad, is_own)
+        .seen(scene.sweep.epoch, &at_m, azimuth_rad, hints, is_own)
 }
 
 /// Where spots are, relative to where the sensor is at the end of the sweep.

@@ -8,6 +8,7 @@ use multiversion::multiversion;
 use super::Scene;
 use super::road_user::Track;
 use super::spots::{Spot, seen_before};
+use crate::beams::Hints;
 use crate::geometry::Rectangle;
 use crate::marks::marked;
 
@@ -61,6 +62,7 @@ impl Strays {
             let corners = around.corners().map(|corner| placement.sensor_m(corner));
             let outline = place.outline();
             let heights_m = [LOW_M, track.height_m() + ABOVE_M].map(|metres| metres as f32);
+            let mut hints = Hints::default();
             for columns in scan.stretches_across(&corners) {
                 let points = scan.points_of(&columns);
                 self.mark(scene, members, points.clone(), heights_m);
@@ -71,7 +73,7 @@ impl Strays {
                         let (point, group) = (point as u32, number as u32);
                         let offset_m = [0, 1].map(|axis| (at_m[axis] - origin_m[axis]) as f32);
                         spots.push(Spot {
-                            before: seen_before(scene, point, offset_m, |_| true),
+                            before: seen_before(scene, point, offset_m, &mut hints, |_| true),
                             ..Spot::new(scene, point, offset_m, group)
                         });
                     }

@@ -26,10 +26,11 @@ impl Azimuths {
     pub fn column_beside(&self, column: usize, after: isize) -> Option<usize> {
         let columns = self.columns as isize;
         let beside = column as isize + after;
-        if self.sees_all_round {
-            Some(beside.rem_euclid(columns.max(1)) as usize)
+        if (0..columns).contains(&beside) {
+            Some(beside as usize)
         } else {
-            (0..columns).contains(&beside).then_some(beside as usize)
+            let around = || beside.rem_euclid(columns.max(1)) as usize;
+            self.sees_all_round.then(around)
         }
     }
 
