@@ -78,7 +78,9 @@ fn check(pipeline: &mut Pipeline) {
                 .all(|number| number.is_finite())
         );
     }
-    assert_eq!(pipeline.publish_objects(Time::ZERO, 0.0).count(), 1);
+    // The list, and each object by itself.
+    let frames = 1 + pipeline.objects().len();
+    assert_eq!(pipeline.publish_objects(Time::ZERO, 0.0).count(), frames);
     for frame in pipeline.publish_map(Time::ZERO) {
         assert!(Envelope::from_datagram(frame).is_ok());
     }

@@ -17,6 +17,10 @@ const FAST_MPS: f64 = 1.5;
 /// Of what is structure for sure motion says nothing, if it is as long as this: shorter ones are
 /// seen whole.
 const LONG_M: f64 = 2.5;
+/// Slower things stand, as far as anybody can tell.
+const SLOWEST_MPS: f64 = 0.3;
+/// Probability of standing below which something moves.
+const HARDLY_STANDS: f64 = 0.1;
 /// How much higher than known something may be where a ray passes far away.
 const HIGHER_M: f64 = 0.4;
 
@@ -148,7 +152,7 @@ impl Track {
             self.newness.forget_way();
         }
         let speed_mps = estimate.velocity_mps.norm();
-        let is_moving = estimate.standing < 0.1 && speed_mps > MOVING_MPS;
+        let is_moving = estimate.standing < HARDLY_STANDS && speed_mps > SLOWEST_MPS;
         let may_move = self.newness.allows_motion(self.usual_points);
         if is_moving && may_move && self.trails.shows_motion(self.shape.seen_m[0], look) {
             self.moves = true;
