@@ -16,7 +16,7 @@ RUN target="$(rustc -vV | sed -n 's/host: //p')" \
 RUN set -- "${CARGO_HOME:-$HOME/.cargo}"/registry/src/*/*/ "$(rustc --print sysroot)/share/doc/rust/" \
     && install -D -m 644 LICENSE /licences/kreisel/LICENSE \
     && for crate do \
-         for text in "$crate"LICEN* "$crate"COPY* "$crate"NOTICE*; do \
+         for text in "$crate"LICEN* "$crate"COPYING* "$crate"COPYRIGHT "$crate"COPYRIGHT-library* "$crate"NOTICE*; do \
            [ ! -f "$text" ] || install -D -m 644 "$text" "/licences/$(basename "$crate")/$(basename "$text")"; \
          done; \
        done
