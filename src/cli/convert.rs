@@ -1,56 +1,39 @@
 //! `kreisel convert`: captured VLP-16 packets to the envelopes that the device service sends, and anything to MCAP.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
 
 use super::capture::Capture;
 use super::files::Output;
+#[cfg(feature = "foxglove")]
+use super::mcap::write as write_mcap;
 use super::{Completion, files};
 
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Capture to read, pcap or pcapng; for MCAP a recording, too.
     #[arg(value_name = "IN.pcap")]
-    input: PathBuf,
+    pub(super) input: PathBuf,
     /// Recording to write, or what Kreisel sees in it if its name ends in .mcap.
     #[arg(value_name = "OUT.rec")]
-    output: PathBuf,
+    pub(super) output: PathBuf,
     /// Configuration file, for MCAP; `kreisel config` prints one.
     #[arg(long, value_name = "FILE.toml")]
-    config: Option<PathBuf>,
+    pub(super) config: Option<PathBuf>,
     /// senderStamp of the envelopes.
     #[arg(long, value_name = "STAMP", default_value_t = 0)]
     id: u32,
 }
 
-impl Arguments {
-    #[cfg(feature = "foxglove")]
-    pub(super) fn input(&self) -> &Path {
-        &self.input
-    }
-
-    pub(super) fn output(&self) -> &Path {
-        &self.output
-    }
-
-    #[cfg(feature = "foxglove")]
-    pub(super) fn config(&self) -> Option<&Path> {
-        self.config.as_deref()
-    }
-}
-
 #[cfg(not(feature = "foxglove"))]
 fn write_mcap(arguments: &Arguments) -> Result<Completion> {
-    let output = arguments.output().display();
+    let output = arguments.output.display();
     anyhow::bail!(
         "{output}: this kreisel was built without MCAP: cargo build --release --features foxglove"
     );
 }
-
-#[cfg(feature = "foxglove")]
-use super::mcap::write as write_mcap;
 
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let inputs = [Some(&arguments.input), arguments.config.as_ref()];

@@ -17,11 +17,11 @@ const STATUS_PERIOD: Span = Span::from_micros(1_000_000);
 
 /// Perceives a recording or a capture and writes an MCAP file.
 pub(super) fn write(arguments: &convert::Arguments) -> Result<Completion> {
-    let configuration = files::configuration(arguments.config())?;
-    let (bytes, mut completion) = files::Recorded::read(arguments.input())?.with_packets();
+    let configuration = files::configuration(arguments.config.as_deref())?;
+    let (bytes, mut completion) = files::Recorded::read(&arguments.input)?.with_packets();
     let mut stage = Stage::new()?;
-    let output = Output::create(arguments.output())?;
-    let named = || arguments.output().display().to_string();
+    let output = Output::create(&arguments.output)?;
+    let named = || arguments.output.display().to_string();
     let writer = stage.context().mcap_writer();
     let writer = writer.create(output).with_context(named)?;
     let mut pipeline = Pipeline::new(&configuration, 0);
@@ -32,7 +32,7 @@ pub(super) fn write(arguments: &convert::Arguments) -> Result<Completion> {
             Ok(entry) => entry,
             Err(damage) => {
                 completion = Completion::Damaged;
-                files::report_damage(arguments.input(), &damage);
+                files::report_damage(&arguments.input, &damage);
                 continue;
             }
         };
@@ -58,7 +58,7 @@ pub(super) fn write(arguments: &convert::Arguments) -> Result<Completion> {
     }
     bar.finish_and_clear();
     writer.close().with_context(named)?.finish()?;
-    report(&pipeline, &faults, arguments.output())?;
+    report(&pipeline, &faults, &arguments.output)?;
     Ok(completion)
 }
 

@@ -53,7 +53,8 @@ impl Trail {
 
 /// Returns from which on a place tells a motion.
 const FEWEST_RETURNS: usize = 4;
-/// Looks from one place of a long trail to the next: who walks slowly shows it in four seconds, not in one.
+/// Looks from one place of a long trail to the next: who walks slowly shows it in four seconds, not in one. Without the
+/// long trail 81 instead of 88 % of the strangers that move are listed (`scripts/evaluate --seeds 74-75 --duration 20`).
 const LONG_STRIDE: u32 = 4;
 
 /// The ways of a thing's middle and of its two ends, as far as they were seen.
