@@ -8,7 +8,7 @@
 
 mod common;
 
-use common::{NAMES, drive, frame_of, plain_pass, quantiles, simulated, time_of};
+use common::{NAMES, WARM, drive, frame_of, plain_pass, quantiles, simulated, time_of};
 use kreisel::config::Configuration;
 use kreisel::pipeline::Pipeline;
 use kreisel::wire::Envelope;
@@ -118,7 +118,8 @@ fn people(count: usize, revolution: usize) -> Vec<u8> {
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     let rounds = arguments.iter().position(|argument| argument == "--rounds");
-    let rounds = rounds.map_or(100, |at| arguments[at + 1].parse().unwrap());
+    let rounds: usize = rounds.map_or(100, |at| arguments[at + 1].parse().unwrap());
+    let rounds = rounds + WARM;
     let configuration = Configuration::default();
     let street = simulated("street", rounds);
     table(
