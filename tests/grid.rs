@@ -409,7 +409,12 @@ fn a_subscriber_that_loses_a_third_of_all_datagrams_has_the_map_after_the_refres
                 bytes += tile.cells.0.len() + 80;
                 if random.uniform() > 1.0 / 3.0 {
                     let levels = tile.levels(drive.pipeline.grid().map_id()).unwrap();
-                    heard.insert([tile.tile_x, tile.tile_y], levels);
+                    let side = tile.cells_per_side as usize;
+                    for (cell, level) in levels.into_iter().enumerate() {
+                        let corner = [tile.tile_x, tile.tile_y].map(|at| at * side as i32);
+                        let at = [cell % side, cell / side].map(|at| at as i32);
+                        heard.insert([corner[0] + at[0], corner[1] + at[1]], level);
+                    }
                 }
             }
         }
@@ -417,10 +422,14 @@ fn a_subscriber_that_loses_a_third_of_all_datagrams_has_the_map_after_the_refres
         for tile in drive.pipeline.grid().map().tiles() {
             let [x, y] = tile.place().map(|at| (f64::from(at) + 0.5) * 6.4);
             if x.hypot(y) < 50.0 {
-                let levels = heard.get(&tile.place()).unwrap();
-                let kinds = tile.levels().zip(levels);
+                let corner = tile.place().map(|at| at * TILE_CELLS as i32);
+                let of = |cell: usize| {
+                    let at = [cell % TILE_CELLS, cell / TILE_CELLS].map(|at| at as i32);
+                    heard[&[corner[0] + at[0], corner[1] + at[1]]]
+                };
+                let kinds = tile.levels().enumerate();
                 cells_off += kinds
-                    .filter(|(own, got)| own.signum() != got.signum())
+                    .filter(|(cell, own)| own.signum() != of(*cell).signum())
                     .count();
             }
         }
@@ -457,14 +466,15 @@ fn in_a_drive_all_tiles_come_round_as_often() {
             }
         }
     }
-    // Five seconds, in which these were within reach all the time.
+    // Five seconds, in which these were within reach all the time; two of them along a side are sent at once.
     let all = drive.pipeline.grid().map().tiles().map(|tile| tile.place());
     let near = all.filter(|[x, y]| {
         let [x, y] = [*x, *y].map(|at| (f64::from(at) + 0.5) * 6.4);
         [24.0, 64.0].iter().all(|from| x.hypot(y - from) < 45.0)
     });
     let counts: Vec<i32> = near
-        .map(|place| sent.get(&place).copied().unwrap_or(0))
+        .map(|place| sent.get(&place.map(|at| at.div_euclid(2))).copied())
+        .map(Option::unwrap_or_default)
         .collect();
     assert!(counts.len() > 30, "{}", counts.len());
     assert!(counts.iter().all(|count| *count >= 6), "{counts:?}");

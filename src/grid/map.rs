@@ -38,9 +38,6 @@ pub struct Tile {
     pub(super) waits_from: Option<Time>,
     /// Whether it was ever sent.
     pub(super) is_known: bool,
-    /// Its cells as they are sent, and the revision that they are of.
-    pub(super) encoded: Vec<u8>,
-    pub(super) encoded_revision: Option<u32>,
 }
 
 /// Unit of the heights in a tile.
@@ -57,8 +54,6 @@ impl Tile {
             revision: 0,
             waits_from: None,
             is_known: false,
-            encoded: vec![],
-            encoded_revision: None,
         }
     }
 
@@ -68,8 +63,7 @@ impl Tile {
         self.top.fill(0);
         self.surely_free.fill(0);
         (self.change, self.revision) = (0, 0);
-        (self.waits_from, self.encoded_revision) = (None, None);
-        self.is_known = false;
+        (self.waits_from, self.is_known) = (None, false);
     }
 
     /// Sets a cell in a revolution.

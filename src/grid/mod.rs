@@ -40,7 +40,7 @@ use evidence::Evidence;
 use filter::{Filter, View};
 use map::HEIGHT_UNIT_M;
 use stretches::Stretch;
-use updates::Updates;
+use updates::{SHEET_CELLS, Updates};
 use window::{Cell, Window};
 
 choices! {
@@ -110,7 +110,7 @@ parameters! {
         /// has the whole map within the grid's reach, as far as the budget suffices.
         refresh_s: f64 = 5.0, in 0.2..=600.0, "s";
         /// How often each tile is sent in that time, changed or not.
-        refresh_rounds: usize = 8, in 1..=100, "";
+        refresh_rounds: usize = 7, in 1..=100, "";
         /// A tile whose datagram would be longer is sent with three levels of occupancy
         /// instead of fifteen, and in any case whole.
         tile_bytes: usize = 1400, in 200..=65000, "bytes";
@@ -368,27 +368,25 @@ impl Grid {
         }
         let tile_m = self.parameters.cell_m * TILE_CELLS as f64;
         let [x, y, _] = sweep.sensor.position_m;
-        let chosen = self
-            .updates
-            .choose(&mut self.map, now, [x / tile_m, y / tile_m]);
-        for place in chosen {
-            let tile = self.map.tile_mut(*place);
+        let (map_id, cell_m) = (self.map_id, self.parameters.cell_m);
+        let sensor = [x / tile_m, y / tile_m];
+        self.updates.choose(&mut self.map, now, sensor, |sheet| {
             let message = GridTile {
-                map_id: self.map_id,
-                revision: tile.revision,
+                map_id,
+                revision: sheet.revision,
                 frame: sweep.frame.number(),
-                tile_x: place[0],
-                tile_y: place[1],
-                cells_per_side: TILE_CELLS as u32,
-                cell_size: self.parameters.cell_m,
+                tile_x: sheet.place[0],
+                tile_y: sheet.place[1],
+                cells_per_side: SHEET_CELLS as u32,
+                cell_size: cell_m,
                 anchor_x: sweep.anchor.origin_m[0],
                 anchor_y: sweep.anchor.origin_m[1],
                 anchor_yaw: sweep.anchor.yaw_rad,
                 ..GridTile::default()
             };
-            let message = message.with_cells(std::mem::take(&mut tile.encoded));
+            let message = message.with_cells(std::mem::take(&mut sheet.cells));
             send(&message);
-            tile.encoded = message.cells.0;
-        }
+            sheet.cells = message.cells.0;
+        });
     }
 }

@@ -167,7 +167,7 @@ export function readPicture(buffer) {
   return { heading, points, messages: [...messages(new Uint8Array(buffer, bright + 4 + brightCount))] };
 }
 
-// Tiles of a daemon have 64 cells a side.
+// Tiles of a daemon have as many cells a side.
 const LARGEST_SIDE = 128;
 
 // Levels of a tile's cells from 0 to 14, 7 is unknown, row by row from the south-west corner.
