@@ -61,7 +61,7 @@ const COSTLY: [(&str, Distance); 7] = [
     // Returns at all distances, none of them ground.
     ("worst", |n| match n % 16 {
         layer if layer < 8 => 100 + layer,
-        _ => 300 + n * 7919 % 2000,
+        _ => 300 + n.wrapping_mul(7919) % 2000,
     }),
     // Flakes on every ray.
     ("snow", |n| 200 + mixed(n) % 400),
