@@ -12,6 +12,8 @@ pub struct Path {
     pieces: Vec<Piece>,
     /// Whether the end is the beginning.
     is_loop: bool,
+    /// The way on which the steering goes over from one piece to the next.
+    steering_m: f64,
     /// Times with the speed at them; between two, the speed changes evenly.
     speeds: Vec<(f64, f64)>,
 }
@@ -20,6 +22,14 @@ pub struct Path {
 struct Piece {
     length_m: f64,
     /// 1/radius, to the left positive.
+    curvature_per_m: f64,
+}
+
+/// A place on the pieces of a path.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    position_m: [f64; 2],
+    yaw_rad: f64,
     curvature_per_m: f64,
 }
 
@@ -53,6 +63,7 @@ impl Path {
             start_yaw_rad: yaw_deg.to_radians(),
             pieces: vec![],
             is_loop: false,
+            steering_m: 0.0,
             speeds: vec![],
         }
     }
@@ -91,6 +102,13 @@ impl Path {
             length_m: radius_m.abs() * degrees.to_radians(),
             curvature_per_m: 1.0 / radius_m,
         });
+        self
+    }
+
+    /// With a steering wheel that takes some way to turn: the curvature goes over evenly from one piece to the next, so
+    /// that the path is within the bends, by `way_m` squared over 24 radii.
+    pub fn steered(mut self, way_m: f64) -> Self {
+        self.steering_m = way_m;
         self
     }
 
@@ -137,34 +155,74 @@ impl Path {
     /// Where it is after some time.
     pub fn at(&self, seconds: f64) -> Moment {
         let (travelled_m, speed_mps, acceleration_mps2) = self.progress(seconds);
-        let total_m: f64 = self.pieces.iter().map(|piece| piece.length_m).sum();
-        let mut left_m = travelled_m;
-        if self.is_loop && total_m > 0.0 {
+        let (share, place) = if self.steering_m > 0.0 {
+            self.steered_place(travelled_m)
+        } else {
+            (1.0, self.place(travelled_m))
+        };
+        Moment {
+            position_m: place.position_m,
+            yaw_rad: wrapped_rad(place.yaw_rad),
+            speed_mps: share * speed_mps,
+            yaw_rate_radps: speed_mps * place.curvature_per_m,
+            acceleration_mps2: share * acceleration_mps2,
+            travelled_m,
+        }
+    }
+
+    /// Place, direction and curvature after so much of the pieces, and straight on before and after them.
+    fn place(&self, way_m: f64) -> Place {
+        let mut left_m = way_m;
+        if self.is_loop {
+            let total_m = self.length_m();
             left_m -= total_m * libm::floor(left_m / total_m);
         }
         let (mut position_m, mut yaw_rad) = (self.start_m, self.start_yaw_rad);
-        let mut curvature_per_m = 0.0;
         for piece in &self.pieces {
             let along_m = left_m.min(piece.length_m);
-            (position_m, yaw_rad) = advanced(position_m, yaw_rad, along_m, piece.curvature_per_m);
-            curvature_per_m = piece.curvature_per_m;
+            let curvature_per_m = if left_m < 0.0 {
+                0.0
+            } else {
+                piece.curvature_per_m
+            };
+            (position_m, yaw_rad) = advanced(position_m, yaw_rad, along_m, curvature_per_m);
             left_m -= along_m;
             if left_m <= 0.0 {
-                break;
+                return Place {
+                    position_m,
+                    yaw_rad,
+                    curvature_per_m,
+                };
             }
         }
-        if left_m > 0.0 {
-            curvature_per_m = 0.0;
-            (position_m, yaw_rad) = advanced(position_m, yaw_rad, left_m, 0.0);
-        }
-        Moment {
+        let (position_m, yaw_rad) = advanced(position_m, yaw_rad, left_m, 0.0);
+        Place {
             position_m,
-            yaw_rad: wrapped_rad(yaw_rad),
-            speed_mps,
-            yaw_rate_radps: speed_mps * curvature_per_m,
-            acceleration_mps2,
-            travelled_m,
+            yaw_rad,
+            curvature_per_m: 0.0,
         }
+    }
+
+    /// The mean of the places within half of the steering's way: of a step in curvature it makes a ramp. Before it, how much
+    /// shorter the way has become.
+    fn steered_place(&self, way_m: f64) -> (f64, Place) {
+        const PARTS: usize = 32;
+        let from_m = way_m - 0.5 * self.steering_m;
+        let part_m = self.steering_m / PARTS as f64;
+        let places_m = (0..PARTS).map(|part| {
+            let middle_m = from_m + (part as f64 + 0.5) * part_m;
+            self.place(middle_m).position_m
+        });
+        let [x, y] = places_m.fold([0.0; 2], |[x, y], at_m| [x + at_m[0], y + at_m[1]]);
+        let [begin, end] = [from_m, from_m + self.steering_m].map(|end_m| self.place(end_m));
+        let chord_m = [0, 1].map(|axis| end.position_m[axis] - begin.position_m[axis]);
+        let share = libm::hypot(chord_m[0], chord_m[1]) / self.steering_m;
+        let place = Place {
+            position_m: [x, y].map(|sum| sum / PARTS as f64),
+            yaw_rad: libm::atan2(chord_m[1], chord_m[0]),
+            curvature_per_m: wrapped_rad(end.yaw_rad - begin.yaw_rad) / self.steering_m,
+        };
+        (share, place)
     }
 
     /// Way, speed and acceleration after some time.
@@ -225,6 +283,33 @@ mod tests {
         assert!(turn_rad.sin().abs() < 1e-3);
         assert!((moved[0].hypot(moved[1]) / 0.0001 - 8.0).abs() < 1e-2);
         assert!((first.yaw_rate_radps + 8.0 / 12.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn steering_makes_ramps_of_steps_in_curvature_and_moves_along_its_yaw() {
+        let bent = |path: Path| path.line(20.0).arc(-9.0, 60.0).arc(7.0, 120.0);
+        let path = bent(Path::from([0.0; 2], 90.0))
+            .steered(5.0)
+            .timed(&[(0.0, 5.0)]);
+        let mut before = path.at(0.0);
+        for step in 1..800 {
+            let now = path.at(0.01 * f64::from(step));
+            let moved = [0, 1].map(|axis| now.position_m[axis] - before.position_m[axis]);
+            let off_rad = wrapped_rad(moved[1].atan2(moved[0]) - now.yaw_rad);
+            assert!(off_rad.abs() < 0.01, "{step}: {off_rad}");
+            // The steering goes from -1/9 to 1/7 within five metres, a second.
+            let ramp = (now.yaw_rate_radps - before.yaw_rate_radps) / 0.01;
+            assert!(
+                ramp.abs() < 1.05 * 5.0 * (1.0 / 9.0 + 1.0 / 7.0),
+                "{step}: {ramp}"
+            );
+            let turned_rad = wrapped_rad(now.yaw_rad - before.yaw_rad);
+            assert!(
+                (turned_rad - 0.01 * now.yaw_rate_radps).abs() < 1e-3,
+                "{step}"
+            );
+            before = now;
+        }
     }
 
     #[test]

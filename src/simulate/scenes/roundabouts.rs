@@ -35,6 +35,8 @@ pub(super) fn waiting_roads() -> Roadmap {
     roads("roundabout-waiting", &[shifted], &SMALL_CIRCLES)
 }
 
+/// On this way a driver turns the wheel from one bend to the other: at 5 m/s by about 500 degrees a second.
+const STEERING_M: f64 = 5.0;
 /// How far the waiting sensor's scene is moved so that the sensor is the origin of a frame without poses.
 const BACK_M: [f64; 2] = [0.0, -21.0];
 
@@ -42,7 +44,7 @@ const BACK_M: [f64; 2] = [0.0, -21.0];
 pub(super) fn roundabout(random: &mut Random) -> Scene {
     let passage = SMALL;
     let hurry = about(random, 0.01);
-    let ego = passage.path(90.0, 26.6, 2).timed(&[
+    let ego = passage.path(90.0, 26.6, 2).steered(STEERING_M).timed(&[
         (0.0, 8.3),
         (1.6, 8.3),
         (4.4, 0.0),
@@ -192,7 +194,7 @@ pub(super) fn mini_roundabout(random: &mut Random) -> Scene {
     ];
     Scene {
         sensor_height_m: SENSOR_M,
-        ego: passage.path(90.0, 25.0, 3).timed(&[
+        ego: passage.path(90.0, 25.0, 3).steered(STEERING_M).timed(&[
             (0.0, 7.0),
             (1.0, 7.0),
             (5.5, 0.0),
