@@ -106,6 +106,23 @@ fn a_drive_without_poses_is_followed_to_half_a_per_cent() {
 }
 
 #[test]
+fn a_drive_that_begins_between_hedges_and_walls_is_not_taken_for_standing() {
+    // Little tells the motion along them at first; without another look either stood for many seconds.
+    for seed in [605, 789] {
+        let turns = drive("strangers", seed, 35);
+        let mut pipeline = pipeline();
+        let places_m: Vec<_> = turns
+            .iter()
+            .map(|turn| place_m(&feed(&mut pipeline, turn, false)))
+            .collect();
+        let later: Vec<&Turn> = turns.iter().skip(25).collect();
+        let [truly, found] = ways_m(&later, &places_m[25..]);
+        let off_m = distance_m(truly, found);
+        assert!(truly[0] > 4.0 && off_m < 0.3, "{seed}: {truly:?} {found:?}");
+    }
+}
+
+#[test]
 fn a_standing_sensor_among_traffic_stays_where_it_is() {
     let mut pipeline = pipeline();
     for turn in drive("standing", 5, 150) {

@@ -28,6 +28,7 @@ use motion::Motion;
 use registration::{Agreement, Alignment, Links};
 
 pub use report::{OdometryReport, Quality};
+use search::Reach;
 
 /// The odometry step.
 #[derive(Debug, Clone)]
@@ -38,8 +39,8 @@ pub struct Odometry {
     /// Since the sweep before, and where the sensor was then.
     passed_s: f64,
     from_m: Vector3<f64>,
-    /// The velocity with which the view was moved to the middle of the sweep.
-    skew_velocity: Vector6<f64>,
+    /// The motion with which the view was moved to the middle of the sweep.
+    skewed: Motion,
     map: Map,
     /// As the sensor met them, and as seen from the middle of the sweep.
     met: View,
@@ -50,6 +51,10 @@ pub struct Odometry {
     state: State,
     /// Whether the frame began at a velocity that was known.
     is_led: bool,
+    /// Revolutions since then that were followed, while it is young.
+    followed: u32,
+    /// In so many of them, up to the last one, another motion fitted better.
+    doubted: u32,
     epoch: u32,
     /// One in so many columns is looked at.
     every: usize,
@@ -107,7 +112,7 @@ impl Default for Odometry {
             time: None,
             passed_s: 0.0,
             from_m: Vector3::zeros(),
-            skew_velocity: Vector6::zeros(),
+            skewed: Motion::begin(Rigid::IDENTITY, None),
             map: Map::new(),
             met: View::default(),
             view: View::default(),
@@ -115,6 +120,8 @@ impl Default for Odometry {
             found: Vec::with_capacity(128),
             state: State::New,
             is_led: false,
+            followed: 0,
+            doubted: 0,
             epoch: 0,
             every: FIRST_EVERY,
             usual_off_m: FIRST_OFF_M,
@@ -130,6 +137,7 @@ impl Odometry {
     pub fn begin(&mut self, pose: &Rigid, velocity: Option<Vector6<f64>>) {
         self.motion = Motion::begin(*pose, velocity);
         self.is_led = velocity.is_some();
+        (self.followed, self.doubted) = (0, 0);
         self.time = None;
         self.map.clear();
         self.state = State::New;
@@ -198,10 +206,37 @@ impl Odometry {
         }
         let predicted = self.motion;
         let mut attempt = self.attempt(predicted);
-        if self.state == State::Begun || !self.is_usual(&attempt) {
-            attempt = self.search(predicted, attempt);
+        if self.state == State::Begun {
+            attempt = self.search(predicted, attempt, Reach::Begin);
+        } else if !self.is_usual(&attempt) {
+            attempt = self.search(predicted, attempt, Reach::Jerk);
+        } else if self.is_doubtful(predicted, &attempt) {
+            self.begin_anew();
+            return;
         }
         self.take(scan, &attempt);
+    }
+
+    /// Whether a frame that is young fits another motion rather than that with which it began: along a wall little tells them
+    /// apart at first, and what is added to the map from a wrong place contradicts it.
+    fn is_doubtful(&mut self, predicted: Motion, attempt: &Attempt) -> bool {
+        /// Revolutions in which it is asked.
+        const YOUNG: u32 = 20;
+        /// Less is the same motion, found a little better.
+        const OTHER_MPS: f64 = 1.0;
+        /// So often in a row is no accident.
+        const OFTEN: u32 = 2;
+        if self.is_led || self.followed >= YOUNG {
+            return false;
+        }
+        self.followed += 1;
+        let skewed = self.skewed;
+        let other = self.search(predicted, *attempt, Reach::Doubt);
+        self.unskew(&skewed);
+        let off = geometry::linear(&(other.motion.velocity - attempt.motion.velocity));
+        let is_other = off.norm_squared() > OTHER_MPS * OTHER_MPS;
+        self.doubted = if is_other { self.doubted + 1 } else { 0 };
+        self.doubted >= OFTEN
     }
 
     /// Looks at more columns in the next revolution where little is seen, and at less where much is.
@@ -231,7 +266,7 @@ impl Odometry {
             }
             let motion = predicted.corrected(alignment.pose, &alignment.information);
             turns += 1;
-            if turns == MOST_TURNS || !motion.skews_otherwise(&self.skew_velocity) {
+            if turns == MOST_TURNS || !motion.skews_otherwise(&self.skewed.velocity) {
                 return Attempt { motion, alignment };
             }
             start = alignment.pose;
@@ -309,13 +344,15 @@ impl Odometry {
         self.state = State::Lost(times);
         self.report.quality = Quality::Lost;
         if times > PATIENCE {
-            self.map.clear();
-            self.motion = Motion::begin(self.motion.pose, None);
-            self.is_led = false;
-            (self.usual_off_m, self.usual_agreement) = (FIRST_OFF_M, Agreement::default());
-            self.epoch = self.epoch.wrapping_add(1);
-            self.state = State::New;
+            self.begin_anew();
         }
+    }
+
+    /// Begins another frame with the next revolution, where the sensor is thought to be by now.
+    fn begin_anew(&mut self) {
+        self.begin(&self.motion.pose.clone(), None);
+        self.report.quality = Quality::Lost;
+        self.epoch = self.epoch.wrapping_add(1);
     }
 
     fn fits(&self, alignment: &Alignment) -> bool {
@@ -327,7 +364,7 @@ impl Odometry {
 
     /// Moves the features to where the sensor would have met them from the middle of the sweep.
     fn unskew(&mut self, motion: &Motion) {
-        self.skew_velocity = motion.velocity;
+        self.skewed = *motion;
         let back = motion.pose.rotation.transpose();
         let velocity = back * geometry::linear(&motion.velocity);
         let rate = back * geometry::angular(&motion.velocity);
