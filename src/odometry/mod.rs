@@ -222,8 +222,6 @@ impl Odometry {
     fn is_doubtful(&mut self, predicted: Motion, attempt: &Attempt) -> bool {
         /// Revolutions in which it is asked.
         const YOUNG: u32 = 20;
-        /// Less is the same motion, found a little better.
-        const OTHER_MPS: f64 = 1.0;
         /// So often in a row is no accident.
         const OFTEN: u32 = 2;
         if self.is_led || self.followed >= YOUNG {
@@ -233,9 +231,11 @@ impl Odometry {
         let skewed = self.skewed;
         let other = self.search(predicted, *attempt, Reach::Doubt);
         self.unskew(&skewed);
-        let off = geometry::linear(&(other.motion.velocity - attempt.motion.velocity));
-        let is_other = off.norm_squared() > OTHER_MPS * OTHER_MPS;
-        self.doubted = if is_other { self.doubted + 1 } else { 0 };
+        self.doubted = if search::is_other(&other, attempt) {
+            self.doubted + 1
+        } else {
+            0
+        };
         self.doubted >= OFTEN
     }
 

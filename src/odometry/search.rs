@@ -6,9 +6,9 @@ use super::motion::Motion;
 use super::{Attempt, Odometry, registration};
 use crate::geometry;
 
-/// How much better than the prediction another motion must fit where the sensor was jerked, where another one would mean that
-/// the frame began with a wrong one, and where there is no prediction. What fits by one in a hundred more is another pose of
-/// the sensor and no other rounding: with 1.05 a simulated drive (strangers, seed 605) began as if the sensor stood.
+/// How much better another motion must fit than the first: where the sensor was jerked, where the frame would have begun with a
+/// wrong one, and where it begins, of which nothing is predicted: with 1.05 there, a simulated drive (strangers, seed 605) began
+/// as if the sensor stood.
 const CLEARLY: f64 = 1.25;
 const RATHER: f64 = 1.05;
 const SLIGHTLY: f64 = 1.01;
@@ -22,6 +22,13 @@ pub(super) enum Reach {
     Doubt,
     /// A jerk beside the prediction.
     Jerk,
+}
+
+/// Whether two attempts are different motions, and not one that was found a little better.
+pub(super) fn is_other(a: &Attempt, b: &Attempt) -> bool {
+    const OTHER_MPS: f64 = 1.0;
+    let off = geometry::linear(&(a.motion.velocity - b.motion.velocity));
+    off.norm_squared() > OTHER_MPS * OTHER_MPS
 }
 
 impl Odometry {
@@ -89,8 +96,8 @@ impl Odometry {
             jerked.jerk(by, self.passed_s);
             let attempt = self.attempt(jerked);
             let better = match reach {
-                Reach::Begin => SLIGHTLY,
-                Reach::Doubt => RATHER,
+                Reach::Begin if is_other(&attempt, &first) => SLIGHTLY,
+                Reach::Begin | Reach::Doubt => RATHER,
                 Reach::Jerk => CLEARLY,
             };
             let share = |attempt: &Attempt| attempt.alignment.agreement.map(|found| found.share);
