@@ -102,6 +102,30 @@ fn pole_place(at_m: &Vector3<f64>) -> Vector3<f64> {
     Vector3::new(at_m.x, at_m.y, ABOVE_ALL_M)
 }
 
+/// A weight that hardly counts in the direction in which a narrow scatter fills its cell: along a hedge the mean of a cell is in
+/// its middle, wherever the sensor is, and thousands of returns that say so hold the sensor back.
+fn except_along(weight: Matrix2<f64>, noise: f64) -> Matrix2<f64> {
+    /// Variance of what lies anywhere in a cell.
+    const EVEN_M2: f64 = CELL_M * CELL_M / 12.0;
+    /// How many times the weight of that is still as good as filled, how much more the other direction weighs where the
+    /// scatter is narrow, and what remains.
+    const FILLED: f64 = 1.6;
+    const NARROW: f64 = 3.0;
+    const REST: f64 = 0.05;
+    let even = noise / (EVEN_M2 + noise);
+    let mean = 0.5 * weight.trace();
+    let half = 0.5 * (weight.m11 - weight.m22);
+    let spread = libm::hypot(half, weight.m12);
+    // The eigenvalues lie so far to both sides of their mean; the axes stay.
+    let (most, least) = (mean + spread, mean - spread);
+    if least > FILLED * even || most < NARROW * least {
+        return weight;
+    }
+    let axes = Matrix2::new(half, weight.m12, weight.m12, -half) / spread;
+    let least = REST * least;
+    Matrix2::identity() * (0.5 * (most + least)) + axes * (0.5 * (most - least))
+}
+
 impl Scatter {
     fn add(&mut self, from_m: Vector2<f64>) {
         if self.count >= MOST {
@@ -126,10 +150,44 @@ impl Scatter {
         let noise = DEVIATION_M * DEVIATION_M;
         let covariance = Matrix2::new(xx, xy, xy, yy) - mean_m * mean_m.transpose()
             + Matrix2::identity() * noise;
-        let weight = covariance.try_inverse()? * noise;
+        let weight = except_along(covariance.try_inverse()? * noise, noise);
         Some(Off {
             off_m: from_m - mean_m,
             weight,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The weight of a return in a cell that was filled so, to the east and to the north.
+    fn weights(east_m: std::ops::Range<i32>, north_m: std::ops::Range<i32>) -> [f64; 2] {
+        let mut uprights = Uprights::new();
+        for (x, y) in (0..60).map(|n| (n * 7 % 20, n * 11 % 20)) {
+            let at = |range: &std::ops::Range<i32>, part: i32| {
+                0.01 * (f64::from(range.start) + f64::from(range.len() as i32 * part) / 20.0)
+            };
+            uprights.add(&Vector3::new(at(&east_m, x), at(&north_m, y), 0.5));
+        }
+        let off = uprights.off(&Vector3::new(0.5, 0.5, 0.5)).unwrap();
+        [off.weight.m11, off.weight.m22]
+    }
+
+    #[test]
+    fn a_hedge_tells_how_far_it_is_and_not_how_far_along_it() {
+        let [across, along] = weights(40..60, 0..100);
+        assert!(across > 0.2 && along < 0.002, "{across} {along}");
+        let [along, across] = weights(0..100, 40..60);
+        assert!(across > 0.2 && along < 0.002, "{across} {along}");
+    }
+
+    #[test]
+    fn a_bush_and_a_trunk_tell_both() {
+        for (size, least) in [(20..80, 0.03), (45..55, 0.3)] {
+            let found = weights(size.clone(), size);
+            assert!(found.iter().all(|weight| *weight > least), "{found:?}");
+        }
     }
 }
