@@ -6,12 +6,10 @@ use super::motion::Motion;
 use super::{Attempt, Odometry, registration};
 use crate::geometry;
 
-/// How much better another motion must fit than the first: where the sensor was jerked, where the frame would have begun with a
-/// wrong one, and where it begins, of which nothing is predicted: with 1.05 there, a simulated drive (strangers, seed 605) began
-/// as if the sensor stood.
+/// How much better another motion must fit than the first: where the sensor was jerked, and where the frame begins or would
+/// have begun with a wrong one.
 const CLEARLY: f64 = 1.25;
-const RATHER: f64 = 1.05;
-const SLIGHTLY: f64 = 1.01;
+const SLIGHTLY: f64 = 1.05;
 
 /// Which motions are looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,8 +94,7 @@ impl Odometry {
             jerked.jerk(by, self.passed_s);
             let attempt = self.attempt(jerked);
             let better = match reach {
-                Reach::Begin if is_other(&attempt, &first) => SLIGHTLY,
-                Reach::Begin | Reach::Doubt => RATHER,
+                Reach::Begin | Reach::Doubt => SLIGHTLY,
                 Reach::Jerk => CLEARLY,
             };
             let share = |attempt: &Attempt| attempt.alignment.agreement.map(|found| found.share);
