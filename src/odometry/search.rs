@@ -15,9 +15,7 @@ const SLIGHTLY: f64 = 1.05;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Reach {
     /// All that a vehicle may have, straight on in any direction.
-    Begin,
-    /// The same, in doubt about the motion that is followed.
-    Doubt,
+    Anywhere,
     /// A jerk beside the prediction.
     Jerk,
 }
@@ -40,7 +38,7 @@ impl Odometry {
             return first;
         }
         self.unskew(&predicted);
-        let begins = reach != Reach::Jerk;
+        let is_anywhere = reach == Reach::Anywhere;
         let ahead = |direction_rad: f64| {
             let (sine, cosine) = libm::sincos(direction_rad);
             predicted.pose.rotation * Vector3::new(sine, cosine, 0.0)
@@ -60,7 +58,7 @@ impl Odometry {
             );
             found.extend(score.map(|score| (score.share, by)));
         };
-        if begins {
+        if is_anywhere {
             for way in 1..=8 {
                 for direction in 0..8 {
                     let shift = ahead(f64::from(direction) * std::f64::consts::FRAC_PI_4);
@@ -93,13 +91,10 @@ impl Odometry {
             let mut jerked = predicted;
             jerked.jerk(by, self.passed_s);
             let attempt = self.attempt(jerked);
-            let better = match reach {
-                Reach::Begin | Reach::Doubt => SLIGHTLY,
-                Reach::Jerk => CLEARLY,
-            };
+            let better = if is_anywhere { SLIGHTLY } else { CLEARLY };
             let share = |attempt: &Attempt| attempt.alignment.agreement.map(|found| found.share);
             let is_better = share(&attempt) > share(&best).map(|least| better * least);
-            if is_better && (begins || self.is_usual(&attempt)) {
+            if is_better && (is_anywhere || self.is_usual(&attempt)) {
                 best = attempt;
             }
             if count == TRIED {
