@@ -182,6 +182,13 @@ fn convert_gives_the_bytes_of_the_device_service() {
     for (ours, theirs) in ours.iter().zip(&theirs) {
         assert!(ours.payload == theirs.payload);
     }
+    let path = folder.text("whole.rec");
+    let whole = kreisel(&["convert", "--whole", capture.to_str().unwrap(), &path]);
+    assert_eq!(code(&whole), 3);
+    let whole = std::fs::read(path).unwrap();
+    let whole = payloads(&whole);
+    assert_eq!(whole.len(), 3);
+    assert!(whole[0].payload == ours[1].payload);
 }
 
 #[test]

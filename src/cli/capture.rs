@@ -181,8 +181,8 @@ pub(super) struct Clouds {
 
 impl Clouds {
     /// Its revolutions without the first one, of which only the end was captured.
-    pub(super) fn whole_revolutions(mut self) -> Vec<u8> {
-        self.frames.split_off(self.first_end)
+    pub(super) fn whole_revolutions(&self) -> &[u8] {
+        &self.frames[self.first_end..]
     }
 
     /// Columns after the last revolution.

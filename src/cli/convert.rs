@@ -25,6 +25,9 @@ pub(super) struct Arguments {
     /// senderStamp of the envelopes.
     #[arg(long, value_name = "STAMP", default_value_t = 0)]
     id: u32,
+    /// Leave out the first revolution, of which only the end was captured; the device service sends it.
+    #[arg(long)]
+    whole: bool,
 }
 
 #[cfg(not(feature = "foxglove"))]
@@ -49,12 +52,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let capture = Capture::read(&arguments.input, &bytes)?;
     let clouds = capture.clouds(arguments.id);
     let mut output = Output::create(&arguments.output)?;
-    output.put(&clouds.frames)?;
+    let (frames, revolutions) = if arguments.whole {
+        let whole = clouds.revolutions.saturating_sub(1);
+        (clouds.whole_revolutions(), whole)
+    } else {
+        (&clouds.frames[..], clouds.revolutions)
+    };
+    output.put(frames)?;
     output.finish()?;
     say!(
-        "{} packets, {} revolutions; {} columns after the last one not sent",
+        "{} packets, {revolutions} revolutions; {} columns after the last one not sent",
         clouds.packets,
-        clouds.revolutions,
         clouds.pending_columns(),
     );
     clouds.warn(&arguments.input);

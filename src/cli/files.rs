@@ -55,7 +55,7 @@ impl Recorded {
                 let clouds = capture.clouds(0);
                 clouds.warn(path);
                 let completion = capture.completion().and(clouds.completion());
-                (clouds.whole_revolutions(), completion)
+                (clouds.whole_revolutions().to_vec(), completion)
             }
         }
     }

@@ -34,6 +34,8 @@ mod inspect;
 
 mod labels;
 
+mod log;
+
 mod map;
 
 #[cfg(feature = "foxglove")]
@@ -164,7 +166,7 @@ const EXIT_DAMAGED: u8 = 3;
 /// Runs the command line; the only place where exit codes are made.
 pub fn main() -> ExitCode {
     let line = CommandLine::parse();
-    log_to_stderr(match line.verbose {
+    log::start(match line.verbose {
         None | Some(0) => Level::INFO,
         Some(1) => Level::DEBUG,
         Some(_) => Level::TRACE,
@@ -199,15 +201,6 @@ fn is_broken_pipe(error: &anyhow::Error) -> bool {
     let kind = |cause: &std::io::Error| cause.kind();
     let io = error.chain().find_map(|cause| cause.downcast_ref());
     io.map(kind) == Some(std::io::ErrorKind::BrokenPipe)
-}
-
-fn log_to_stderr(level: Level) {
-    tracing_subscriber::fmt()
-        .with_max_level(level)
-        .with_target(false)
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
-        .init();
 }
 
 /// File descriptors that sockets, signals and the view of a command may need. Where they are missing, tokio panics.

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use axum::body::Bytes;
 use tokio::sync::watch;
+use tokio_tungstenite::tungstenite::Bytes;
 
 use super::labels::Around;
 use super::measures::Measures;

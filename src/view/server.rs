@@ -2,28 +2,24 @@
 
 use std::io;
 use std::net::{IpAddr, SocketAddr};
-use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::task::{Context, Poll};
 use std::time::Duration;
 
-use axum::Router;
-use axum::body::Bytes;
-use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
-use axum::extract::{Request, State};
-use axum::http::uri::Authority;
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
-use axum::middleware::{self, Next};
-use axum::response::{IntoResponse, Response};
-use axum::routing::get;
+use futures_util::{SinkExt as _, StreamExt as _};
 use serde::Deserialize;
-use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, watch};
-use tokio::time::{Instant, Sleep, sleep};
+use tokio::sync::{Semaphore, mpsc, watch};
+use tokio::time::{sleep, timeout};
+use tokio_tungstenite::WebSocketStream;
+use tokio_tungstenite::tungstenite::handshake::server::{Request, create_response};
+use tokio_tungstenite::tungstenite::http::uri::Authority;
+use tokio_tungstenite::tungstenite::http::{HeaderMap, StatusCode, header};
+use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
+use tokio_tungstenite::tungstenite::{Bytes, Message};
 
 use super::feed::{Feed, Shown};
+use super::http::{self, Answer};
 use super::metrics::{self, Told};
 use super::picture;
 
@@ -35,6 +31,12 @@ const MOST_VIEWERS: usize = 64;
 
 /// Connections at a time; more wait.
 const MOST_CONNECTIONS: usize = 256;
+
+/// A connection over which nothing goes for so long is given up; pictures go ten times a second.
+const LONGEST_SILENCE: Duration = Duration::from_secs(30);
+
+/// Until connections are taken again after none could be.
+const AFTER_A_FAILURE: Duration = Duration::from_millis(100);
 
 /// Longest message of a viewer, bytes.
 const LONGEST_CONTROL: usize = 1024;
@@ -90,116 +92,12 @@ pub fn serve(address: SocketAddr) -> io::Result<(Feed, mpsc::Receiver<Control>)>
         came: Arc::default(),
     };
     let feed = Feed::new(address, shown, told, served.came.clone());
-    let serve = move || {
-        runtime.block_on(async {
-            let listener = Limited {
-                listener: TcpListener::from_std(listener)?,
-                connections: Arc::new(Semaphore::new(MOST_CONNECTIONS)),
-            };
-            axum::serve(listener, router(served)).await
-        })
-    };
+    let serve =
+        move || runtime.block_on(async { listen(TcpListener::from_std(listener)?, served).await });
     std::thread::Builder::new()
         .name("view".into())
         .spawn(serve)?;
     Ok((feed, asked))
-}
-
-/// A listener that takes so many connections at a time.
-struct Limited {
-    listener: TcpListener,
-    connections: Arc<Semaphore>,
-}
-
-impl axum::serve::Listener for Limited {
-    type Io = Connection;
-    type Addr = SocketAddr;
-
-    async fn accept(&mut self) -> (Self::Io, Self::Addr) {
-        loop {
-            // The semaphore is never closed.
-            let Ok(permit) = self.connections.clone().acquire_owned().await else {
-                return std::future::pending().await;
-            };
-            let (stream, address) = axum::serve::Listener::accept(&mut self.listener).await;
-            if stream.set_nodelay(true).is_ok() {
-                return (Connection::new(stream, LONGEST_SILENCE, permit), address);
-            }
-        }
-    }
-
-    fn local_addr(&self) -> io::Result<Self::Addr> {
-        self.listener.local_addr()
-    }
-}
-
-/// A connection over which nothing goes for so long is given up; pictures go ten times a second.
-const LONGEST_SILENCE: Duration = Duration::from_secs(30);
-
-/// A connection, counted for as long as it lives.
-struct Connection {
-    stream: TcpStream,
-    /// How long nothing may go over it.
-    patience: Duration,
-    /// When it is given up.
-    end: Pin<Box<Sleep>>,
-    _permit: OwnedSemaphorePermit,
-}
-
-impl Connection {
-    fn new(stream: TcpStream, patience: Duration, permit: OwnedSemaphorePermit) -> Self {
-        Self {
-            stream,
-            patience,
-            end: Box::pin(sleep(patience)),
-            _permit: permit,
-        }
-    }
-
-    /// What came of reading or writing, unless nothing has come of it for too long.
-    fn or_end<T>(
-        &mut self,
-        context: &mut Context<'_>,
-        result: Poll<io::Result<T>>,
-    ) -> Poll<io::Result<T>> {
-        if result.is_ready() {
-            self.end.as_mut().reset(Instant::now() + self.patience);
-            result
-        } else {
-            let ended = self.end.as_mut().poll(context);
-            ended.map(|()| Err(io::ErrorKind::TimedOut.into()))
-        }
-    }
-}
-
-impl AsyncRead for Connection {
-    fn poll_read(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-        buffer: &mut ReadBuf<'_>,
-    ) -> Poll<io::Result<()>> {
-        let read = Pin::new(&mut self.stream).poll_read(context, buffer);
-        self.or_end(context, read)
-    }
-}
-
-impl AsyncWrite for Connection {
-    fn poll_write(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-        bytes: &[u8],
-    ) -> Poll<io::Result<usize>> {
-        let written = Pin::new(&mut self.stream).poll_write(context, bytes);
-        self.or_end(context, written)
-    }
-
-    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_flush(context)
-    }
-
-    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_shutdown(context)
-    }
 }
 
 macro_rules! page {
@@ -221,80 +119,122 @@ page! {
     "/panel.js" => "panel.js", "text/javascript; charset=utf-8";
 }
 
-/// The page loads nothing from elsewhere, and no other page may frame it.
-const POLICY: &str = "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'";
-
-fn router(served: Served) -> Router {
-    let files = PAGE
-        .iter()
-        .fold(Router::new(), |router, (path, kind, text)| {
-            let headers = [
-                (header::CONTENT_TYPE, *kind),
-                (header::CONTENT_SECURITY_POLICY, POLICY),
-                (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
-                (header::CACHE_CONTROL, "no-cache"),
-            ];
-            router.route(path, get(move || async move { (headers, *text) }))
-        });
-    files
-        .route("/pictures", get(pictures))
-        .route("/metrics", get(metrics))
-        .route("/health", get(health))
-        .layer(middleware::from_fn(refuse_strangers))
-        .with_state(served)
-}
-
-/// What Prometheus asks for; nothing where no daemon tells its Status.
-async fn metrics(State(served): State<Served>) -> Response {
-    let told = served.told.borrow().clone();
-    let text = told.map(|told| metrics::text(&told)).unwrap_or_default();
-    ([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], text).into_response()
-}
-
-/// The same as `kreisel health` says.
-async fn health(State(served): State<Served>) -> Response {
-    let told = served.told.borrow().clone();
-    match metrics::health(told.as_ref()) {
-        Ok(()) => "ok".into_response(),
-        Err(why) => (StatusCode::SERVICE_UNAVAILABLE, why).into_response(),
+/// Takes connections, so many at a time.
+async fn listen(listener: TcpListener, served: Served) -> io::Result<()> {
+    let connections = Arc::new(Semaphore::new(MOST_CONNECTIONS));
+    loop {
+        // The semaphore is never closed.
+        let Ok(permit) = connections.clone().acquire_owned().await else {
+            return Ok(());
+        };
+        match listener.accept().await {
+            Ok((stream, _)) => {
+                let served = served.clone();
+                tokio::spawn(async move {
+                    answer(stream, served, LONGEST_SILENCE).await;
+                    drop(permit);
+                });
+            }
+            // Out of descriptors, say: others may end meanwhile.
+            Err(_) => sleep(AFTER_A_FAILURE).await,
+        }
     }
 }
 
-/// Opens the stream of pictures.
-async fn pictures(State(served): State<Served>, upgrade: WebSocketUpgrade) -> Response {
-    let Ok(place) = served.viewers.clone().try_acquire_owned() else {
-        return (StatusCode::SERVICE_UNAVAILABLE, "too many viewers").into_response();
+/// Answers what a connection asks for, and ends it; who says nothing for so long is not waited for.
+async fn answer(mut stream: TcpStream, served: Served, patience: Duration) {
+    let Ok(Ok((request, rest))) = timeout(patience, http::read(&mut stream)).await else {
+        return;
     };
-    let upgrade = upgrade
-        .max_message_size(LONGEST_CONTROL)
-        .max_frame_size(LONGEST_CONTROL);
-    upgrade.on_upgrade(move |socket| async move {
-        let shown = served.shown.subscribe();
-        served.came.fetch_add(1, Ordering::Release);
-        send_pictures(socket, shown, served.controls).await;
-        drop(place);
-    })
+    let answer = match request {
+        Ok(request) if !is_own_page(request.headers()) => Answer::text(
+            StatusCode::FORBIDDEN,
+            "open this page by its address; only the page that is served here may look",
+        ),
+        Ok(request) if request.uri().path() == "/pictures" => {
+            match served.viewers.clone().try_acquire_owned() {
+                Ok(place) => {
+                    show(stream, &request, rest, served, patience).await;
+                    return drop(place);
+                }
+                Err(_) => Answer::text(StatusCode::SERVICE_UNAVAILABLE, "too many viewers"),
+            }
+        }
+        Ok(request) => page(request.uri().path(), &served),
+        Err(status) => Answer::text(status, ""),
+    };
+    // Who does not take it is gone.
+    let _ = timeout(patience, http::write(&mut stream, &answer)).await;
 }
 
-/// Refuses what a page from elsewhere asks for.
-async fn refuse_strangers(request: Request, next: Next) -> Response {
-    if is_own_page(request.headers()) {
-        next.run(request).await
-    } else {
-        let why = "open this page by its address; only the page that is served here may look";
-        (StatusCode::FORBIDDEN, why).into_response()
+/// What is found at a path.
+fn page(path: &str, served: &Served) -> Answer {
+    match path {
+        // What Prometheus asks for; nothing where no daemon tells its Status.
+        "/metrics" => {
+            let told = served.told.borrow().clone();
+            Answer {
+                status: StatusCode::OK,
+                kind: "text/plain; version=0.0.4",
+                body: told
+                    .map(|told| metrics::text(&told))
+                    .unwrap_or_default()
+                    .into(),
+            }
+        }
+        // The same as `kreisel health` says.
+        "/health" => {
+            let told = served.told.borrow().clone();
+            match metrics::health(told.as_ref()) {
+                Ok(()) => Answer::text(StatusCode::OK, "ok"),
+                Err(why) => Answer::text(StatusCode::SERVICE_UNAVAILABLE, why),
+            }
+        }
+        _ => match PAGE.iter().find(|(own, _, _)| *own == path) {
+            Some((_, kind, text)) => Answer {
+                status: StatusCode::OK,
+                kind,
+                body: (*text).into(),
+            },
+            None => Answer::text(StatusCode::NOT_FOUND, ""),
+        },
     }
+}
+
+/// Opens the stream of pictures, if that is what is asked for.
+async fn show(
+    mut stream: TcpStream,
+    request: &Request,
+    rest: Vec<u8>,
+    served: Served,
+    patience: Duration,
+) {
+    let Ok(switching) = create_response(request) else {
+        let answer = Answer::text(StatusCode::BAD_REQUEST, "this is a WebSocket");
+        let _ = timeout(patience, http::write(&mut stream, &answer)).await;
+        return;
+    };
+    if !matches!(
+        timeout(patience, http::switch(&mut stream, &switching)).await,
+        Ok(Ok(()))
+    ) {
+        return;
+    }
+    let limits = WebSocketConfig::default()
+        .max_message_size(Some(LONGEST_CONTROL))
+        .max_frame_size(Some(LONGEST_CONTROL));
+    let socket =
+        WebSocketStream::from_partially_read(stream, rest, Role::Server, Some(limits)).await;
+    let shown = served.shown.subscribe();
+    served.came.fetch_add(1, Ordering::Release);
+    send_pictures(socket, shown, served.controls, patience).await;
 }
 
 /// Whether what asks is our own page, or no browser: a WebSocket is not held back by the same-origin policy, and a
 /// page whose name server leads here passes for our own. What is no browser names no origin; names that anybody
 /// can register have a dot.
 fn is_own_page(headers: &HeaderMap) -> bool {
-    let text = |name| {
-        headers
-            .get(name)
-            .and_then(|value: &HeaderValue| value.to_str().ok())
-    };
+    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
     let Some(host) = text(header::HOST).and_then(|host| host.parse::<Authority>().ok()) else {
         return false;
     };
@@ -308,9 +248,10 @@ fn is_own_page(headers: &HeaderMap) -> bool {
 
 /// Sends pictures to a viewer, always the newest, and takes what it asks for, until it is gone.
 async fn send_pictures(
-    mut socket: WebSocket,
+    mut socket: WebSocketStream<TcpStream>,
     mut shown: watch::Receiver<Shown>,
     controls: mpsc::Sender<Control>,
+    patience: Duration,
 ) {
     let mut last = None;
     loop {
@@ -327,19 +268,22 @@ async fn send_pictures(
                 } else {
                     newest.bytes
                 };
-                if socket.send(Message::Binary(bytes)).await.is_err() {
+                let sent = timeout(patience, socket.send(Message::Binary(bytes))).await;
+                if !matches!(sent, Ok(Ok(()))) {
                     return;
                 }
             }
-            message = socket.recv() => match message {
-                Some(Ok(Message::Text(text))) => {
+            message = timeout(patience, socket.next()) => match message {
+                Ok(Some(Ok(Message::Text(text)))) => {
                     if let Ok(control) = serde_json::from_str(&text) {
                         // When nobody listens, or too much was asked for, it is left out.
                         let _ = controls.try_send(control);
                     }
                 }
-                Some(Ok(_)) => {}
-                Some(Err(_)) | None => return,
+                Ok(Some(Ok(_))) => {}
+                Ok(Some(Err(_)) | None) => return,
+                // Nothing was shown for so long, either: whoever is still there comes again.
+                Err(_) => return,
             },
         }
     }
@@ -347,6 +291,9 @@ async fn send_pictures(
 
 #[cfg(test)]
 mod tests {
+    use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+    use tokio_tungstenite::tungstenite::http::HeaderValue;
+
     use super::*;
 
     #[test]
@@ -372,28 +319,50 @@ mod tests {
         assert!(!is_own_page(&HeaderMap::new()));
     }
 
-    #[tokio::test]
-    async fn a_connection_over_which_nothing_goes_is_given_up() {
-        use tokio::io::AsyncReadExt as _;
-        use tokio::io::AsyncWriteExt as _;
+    /// A connection that is served so patiently.
+    async fn connected(patience: Duration) -> (TcpStream, Served) {
+        let served = Served {
+            shown: watch::Sender::default(),
+            told: watch::Sender::default(),
+            controls: mpsc::channel(1).0,
+            viewers: Arc::new(Semaphore::new(1)),
+            came: Arc::default(),
+        };
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
-        let mut client = TcpStream::connect(listener.local_addr().unwrap())
-            .await
-            .unwrap();
-        let (stream, _) = listener.accept().await.unwrap();
-        let connections = Arc::new(Semaphore::new(1));
-        let permit = connections.clone().acquire_owned().await.unwrap();
-        let mut connection = Connection::new(stream, Duration::from_millis(300), permit);
-        // What says something in time is kept.
-        for _ in 0..4 {
-            tokio::time::sleep(Duration::from_millis(100)).await;
-            client.write_all(b"x").await.unwrap();
-            assert_eq!(connection.read_u8().await.unwrap(), b'x');
+        let client = TcpStream::connect(listener.local_addr().unwrap());
+        let (client, accepted) = tokio::join!(client, listener.accept());
+        let (stream, _) = accepted.unwrap();
+        tokio::spawn(answer(stream, served.clone(), patience));
+        (client.unwrap(), served)
+    }
+
+    #[tokio::test]
+    async fn who_asks_for_nothing_is_given_up() {
+        let (mut client, _served) = connected(Duration::from_millis(100)).await;
+        client.write_all(b"GET /").await.unwrap();
+        let mut answer = vec![];
+        client.read_to_end(&mut answer).await.unwrap();
+        assert_eq!(answer, b"");
+    }
+
+    #[tokio::test]
+    async fn a_viewer_over_whom_nothing_goes_is_given_up() {
+        let (mut client, served) = connected(Duration::from_millis(300)).await;
+        let asked = "GET /pictures HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\n\
+            Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n\
+            Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
+        client.write_all(asked.as_bytes()).await.unwrap();
+        let mut head = [0; 12];
+        client.read_exact(&mut head).await.unwrap();
+        assert_eq!(&head, b"HTTP/1.1 101");
+        // As long as pictures come, it is kept.
+        for _ in 0..6 {
+            sleep(Duration::from_millis(100)).await;
+            assert_eq!(served.viewers.available_permits(), 0);
+            served.shown.send_modify(|shown| shown.number += 1);
         }
-        let error = connection.read_u8().await.unwrap_err();
-        assert_eq!(error.kind(), io::ErrorKind::TimedOut);
-        drop(connection);
-        assert_eq!(connections.available_permits(), 1);
+        client.read_to_end(&mut vec![]).await.unwrap();
+        assert_eq!(served.viewers.available_permits(), 1);
     }
 
     #[test]
