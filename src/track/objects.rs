@@ -187,6 +187,9 @@ impl ObjectTracker {
     fn update(&mut self, scene: &Scene<'_>, end: Time) {
         let placement = scene.sweep.sensor.placement();
         let sensor_height_m = scene.ground.plane.height_m();
+        let sight = |place: &Rectangle, height_m: f64| {
+            Sight::at(scene.scan, &placement, sensor_height_m, place, height_m)
+        };
         for (number, (track, pair)) in self
             .tracks
             .iter_mut()
@@ -198,16 +201,14 @@ impl ObjectTracker {
                     let spots = self.grouping.spots(group);
                     let floor_z_m = floor_z_m(spots, scene);
                     track.measure(spots, &group.look, end, floor_z_m, &mut self.outline);
+                    track.look_back(sight);
                     if self.grouping.holds_things_apart(number) {
                         track.give_way();
                     }
                 }
                 None if track.rests() => {}
                 None => {
-                    let (place, height_m) = (track.rectangle(), track.height_m());
-                    let sight =
-                        Sight::at(scene.scan, &placement, sensor_height_m, &place, height_m);
-                    track.miss(&sight, end);
+                    track.miss(&sight(&track.rectangle(), track.height_m()), end);
                 }
             }
         }

@@ -132,7 +132,7 @@ impl Track {
     }
 
     /// Notes whether it moves: by speed, and by a trail that is straight and long enough that
-    /// no change of view explains it.
+    /// no change of view explains it, or an empty place behind it.
     fn note_motion(&mut self, look: &Look) {
         let estimate = self.motion.estimate();
         // Of walls behind what is near, another piece is seen in every revolution.
@@ -151,10 +151,11 @@ impl Track {
             self.born_m = estimate.position_m;
             self.newness.forget_way();
         }
-        let speed_mps = estimate.velocity_mps.norm();
-        let is_moving = estimate.standing < HARDLY_STANDS && speed_mps > SLOWEST_MPS;
+        let is_moving = self.goes();
         let may_move = self.newness.allows_motion(self.usual_points);
-        if is_moving && may_move && self.trails.shows_motion(self.shape.seen_m[0], look) {
+        let shows_motion =
+            self.newness.left.is_sure() || self.trails.shows_motion(self.shape.seen_m[0], look);
+        if is_moving && may_move && shows_motion {
             self.moves = true;
             self.newness
                 .note_way(estimate.position_m, self.usual_points);
@@ -162,6 +163,7 @@ impl Track {
             self.travelled_m = self.travelled_m.max(travelled_m);
         }
         if is_moving {
+            let speed_mps = estimate.velocity_mps.norm();
             let gain = if speed_mps > self.speed_mps {
                 0.15
             } else {
@@ -169,6 +171,12 @@ impl Track {
             };
             self.speed_mps += gain * (speed_mps - self.speed_mps);
         }
+    }
+
+    /// Whether it seems to go, by its motion alone.
+    pub(super) fn goes(&self) -> bool {
+        let estimate = self.motion.estimate();
+        estimate.standing < HARDLY_STANDS && estimate.velocity_mps.norm() > SLOWEST_MPS
     }
 
     /// Whether it was of late where nothing was before.

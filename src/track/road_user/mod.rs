@@ -14,6 +14,8 @@ mod rest;
 
 mod reunion;
 
+mod vacated;
+
 use super::TrackParameters;
 use super::belief::Belief;
 use super::existence::Existence;

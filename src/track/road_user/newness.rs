@@ -2,6 +2,7 @@
 
 use nalgebra::Vector2;
 
+use super::vacated::Vacated;
 use crate::track::look::Look;
 
 /// What was seen before of the places of an object's returns, of late.
@@ -10,6 +11,8 @@ pub(super) struct Newness {
     /// Returns a revolution whose place was seen empty, and occupied.
     new: f64,
     old: f64,
+    /// Whether nothing is left where it was.
+    pub(super) left: Vacated,
     /// Where the object was when it was first seen to move to where nothing was, and how far it went from there.
     from_m: Option<Vector2<f64>>,
     way_m: f64,
@@ -33,6 +36,7 @@ impl Newness {
         Self {
             new: look.new,
             old: look.old,
+            left: Vacated::default(),
             from_m: None,
             way_m: 0.0,
         }
@@ -56,22 +60,22 @@ impl Newness {
         (known >= FEWEST.max(LEAST_SHARE * usual_points)).then(|| self.new / known)
     }
 
-    /// Whether it is where nothing was.
+    /// Whether it is where nothing was, or nothing is where it was.
     pub(super) fn was_empty(&self, usual_points: f64) -> bool {
         let share = self.share(usual_points);
-        share.is_some_and(|share| share > LEAST_NEW)
+        self.left.is_sure() || share.is_some_and(|share| share > LEAST_NEW)
     }
 
     /// Whether it is where something stood.
     pub(super) fn was_occupied(&self, usual_points: f64) -> bool {
         let share = self.share(usual_points);
-        share.is_some_and(|share| share < LEAST_MOVED)
+        !self.left.is_sure() && share.is_some_and(|share| share < LEAST_MOVED)
     }
 
     /// Whether it may have moved to where it is.
     pub(super) fn allows_motion(&self, usual_points: f64) -> bool {
         let share = self.share(usual_points);
-        share.is_none_or(|share| share > LEAST_NEW)
+        self.left.is_sure() || share.is_none_or(|share| share > LEAST_NEW)
     }
 
     /// Whether it only seems to move: it clings to something that stood there before it came.
