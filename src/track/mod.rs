@@ -7,9 +7,10 @@
 //! and the `strays` near it, `assignment` what is whose, `sight` what is hidden and what is gone;
 //! `nearby` spares all of them what is far away. A `road_user` learns from each `look`, and the
 //! `view` of it in the road user's own axes, its `motion`, its `shape`, its `class`, of which there
-//! is a `belief`, and by its `trail` whether it moves; `existence` says whether it is there at all;
-//! what stands and is hardly a road user rests most of the time, and one that was lost gets its id
-//! back (`road_user`). `nearest` is the tracking of the thesis.
+//! is a `belief`, and by its `trail` whether it moves; `existence` says whether it is there at all, and
+//! `confidence` how often that is right; what stands and is hardly a road user rests most of the
+//! time, and one that was lost gets its id back (`road_user`). `nearest` is the tracking of the
+//! thesis.
 
 mod above;
 
@@ -20,6 +21,8 @@ mod belief;
 mod claims;
 
 mod class;
+
+mod confidence;
 
 mod existence;
 

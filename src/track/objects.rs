@@ -303,7 +303,7 @@ impl ObjectTracker {
         self.objects.clear();
         let least = parameters.least_confidence;
         let is_due = |track: &Track| {
-            let may_be = !track.is_published && track.most_existence() >= least;
+            let may_be = !track.is_published && track.most_confidence() >= least;
             may_be && track.object(end).existence >= least
         };
         let mut number = 0;
@@ -314,7 +314,7 @@ impl ObjectTracker {
             }
             number += 1;
         }
-        let may_be = |track: &&Track| track.is_published && track.most_existence() >= least;
+        let may_be = |track: &&Track| track.is_published && track.most_confidence() >= least;
         let objects = self.tracks.iter().filter(may_be);
         let objects = objects.map(|track| track.object(end));
         let listed = objects.filter(|object| object.existence >= least);

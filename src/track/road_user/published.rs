@@ -5,14 +5,20 @@ use nalgebra::Vector2;
 use super::Track;
 use crate::time::Time;
 use crate::track::Object;
+use crate::track::confidence::confidence;
 
 /// An object that is farther than this from where it is said to be is not there.
 const THERE_M: f64 = 2.0;
 
 impl Track {
-    /// How likely it exists at most, wherever it is: never less than [`Object::existence`].
-    pub(in crate::track) fn most_existence(&self) -> f64 {
+    /// The existence of a road user, by the track and what it looks like.
+    pub(super) fn road_user(&self) -> f64 {
         self.existence.probability() * self.belief.road_user()
+    }
+
+    /// How likely it exists at most, wherever it is: never less than [`Object::existence`].
+    pub(in crate::track) fn most_confidence(&self) -> f64 {
+        confidence(self.road_user())
     }
 
     /// What is published, valid at `end`.
@@ -54,7 +60,7 @@ impl Track {
                 .map(|axis| libm::sqrt(estimate.position_covariance[(axis, axis)])),
             yaw_deviation_rad: libm::sqrt(shape.yaw_variance),
             speed_deviation_mps: libm::sqrt(speed_variance),
-            existence: self.most_existence() * there,
+            existence: confidence(self.road_user() * there),
             first_seen: self.first_seen,
             seen_since: self.seen_since,
             last_measured: self.last_measured,
