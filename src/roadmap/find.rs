@@ -41,7 +41,7 @@ fn from_declared(network: &Network<'_>, declared: &DeclaredRoundabout) -> Rounda
             },
             width_m: circle.outer_m - circle.inner_m,
             kind: circle.kind,
-            is_marked: false,
+            is_marked: circle.is_marked,
         })
         .collect();
     rings.sort_by(|a, b| a.circle.radius_m.total_cmp(&b.circle.radius_m));

@@ -59,6 +59,9 @@ pub struct Roadmap {
     pub skipped: BTreeMap<String, usize>,
 }
 
+/// The marking that parts two lanes in one direction.
+const BETWEEN_LANES: &str = "broken_white";
+
 /// Where a map's places are counted from, and what turns it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Origin {
@@ -210,6 +213,8 @@ pub struct DeclaredCircle {
     pub inner_m: f64,
     /// Radius of its outer edge.
     pub outer_m: f64,
+    /// Whether a line parts it from another one.
+    pub is_marked: bool,
 }
 
 /// A lane that leads to or from a circle.

@@ -10,7 +10,8 @@ use roxmltree::{Document, Node};
 
 use super::curve::Vertex;
 use super::{
-    Connector, Curve, Lane, LaneId, LaneKind, MapError, Origin, PointId, Polyline, Roadmap,
+    BETWEEN_LANES, Connector, Curve, Lane, LaneId, LaneKind, MapError, Origin, PointId, Polyline,
+    Roadmap,
 };
 use crate::ego::geodesy::{Geodetic, LocalFrame};
 use crate::ego::wrapped_rad;
@@ -288,7 +289,7 @@ impl<'a> Reader<'a> {
                     point: number,
                 });
             }
-            let line = lanes.is_marked.then(|| "broken_white".to_owned());
+            let line = lanes.is_marked.then(|| BETWEEN_LANES.to_owned());
             self.map.lanes.push(Lane {
                 id,
                 road_name: lanes.name.clone(),

@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{PI, TAU};
 
-use super::Polyline;
 use super::circle::Circle;
 use super::network::Network;
 use super::polyline::distance_m;
 use super::roundabout::{Ring, Roundabout, Source};
+use super::{BETWEEN_LANES, Polyline};
 use crate::ego::wrapped_rad;
 
 /// Radii that the middle of a lane round a roundabout may have: the smallest mini roundabouts
@@ -138,7 +138,7 @@ fn made(
             // A broken line is what parts two lanes in one direction.
             is_marked: lines
                 .iter()
-                .any(|line| line.as_deref() == Some("broken_white")),
+                .any(|line| line.as_deref() == Some(BETWEEN_LANES)),
         }],
         is_clockwise,
         arms: vec![],

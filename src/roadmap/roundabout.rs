@@ -116,6 +116,7 @@ impl Roundabout {
             kind: ring.kind,
             inner_m: ring.inner_m().max(0.0),
             outer_m: ring.outer_m(),
+            is_marked: ring.is_marked,
         });
         let arms = self.arms.iter();
         let accesses = arms.flat_map(|arm| {

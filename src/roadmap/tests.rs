@@ -153,6 +153,7 @@ fn two_rings_are_two_lanes_and_with_a_line_between_them_large() {
                 kind,
                 inner_m,
                 outer_m,
+                is_marked: false,
             })
             .collect(),
         junctions: vec![],
@@ -165,17 +166,21 @@ fn two_rings_are_two_lanes_and_with_a_line_between_them_large() {
         ])],
         ..Roadmap::default()
     };
-    let mut found = roundabouts(&map);
+    let found = roundabouts(&map);
     let elements = Elements::of(&found[0]);
     assert_eq!((elements.kind, elements.lanes), (Kind::TwoLane, 2));
     assert_eq!(
         (elements.outer_diameter_m, elements.path_width_m),
         (44.0, 8.0)
     );
-    for ring in &mut found[0].rings {
-        ring.is_marked = true;
+    let mut marked = map;
+    for circle in &mut marked.declared[0].circles {
+        circle.is_marked = true;
     }
-    assert_eq!(Elements::of(&found[0]).kind, Kind::Large);
+    // Read again, it is the same one.
+    for map in [scn::read(&scn::write(&marked)).unwrap(), marked] {
+        assert_eq!(Elements::of(&roundabouts(&map)[0]).kind, Kind::Large);
+    }
 }
 
 #[test]

@@ -59,6 +59,9 @@ pub(super) async fn read(
             Ok(None) if head.len() < LONGEST_HEAD => continue,
             Ok(None) => StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE,
             Err(Error::Protocol(ProtocolError::WrongHttpMethod)) => StatusCode::METHOD_NOT_ALLOWED,
+            Err(Error::Protocol(ProtocolError::WrongHttpVersion)) => {
+                StatusCode::HTTP_VERSION_NOT_SUPPORTED
+            }
             Err(_) => StatusCode::BAD_REQUEST,
         };
         return Ok((Err(refused), vec![]));

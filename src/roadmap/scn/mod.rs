@@ -20,6 +20,7 @@
 //! LANETYPE road
 //! INNERRADIUS 9
 //! OUTERRADIUS 13
+//! MARKING broken_white
 //! ENDCIRCLE
 //! ENTRY (1.9.3.158) -> 1
 //! EXIT 1 -> (1.9.1.1)

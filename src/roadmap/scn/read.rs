@@ -5,7 +5,8 @@ use super::values::{connector, interval, is_clockwise, junction, kind, length, n
 use crate::ego::geodesy::Geodetic;
 use crate::roadmap::curve::Vertex;
 use crate::roadmap::{
-    Curve, DeclaredCircle, DeclaredRoundabout, Lane, LaneId, LaneKind, MapError, Origin, Roadmap,
+    BETWEEN_LANES, Curve, DeclaredCircle, DeclaredRoundabout, Lane, LaneId, LaneKind, MapError,
+    Origin, Roadmap,
 };
 
 /// The roads of a scenario. What is no road is passed over and counted by name.
@@ -291,6 +292,7 @@ impl<'a> Reader<'a> {
             kind: LaneKind::default(),
             inner_m: 0.0,
             outer_m: 0.0,
+            is_marked: false,
         };
         loop {
             let line = self.lines.next("ENDCIRCLE")?;
@@ -299,6 +301,7 @@ impl<'a> Reader<'a> {
                 "LANETYPE" => found.kind = kind(&line)?,
                 "INNERRADIUS" => found.inner_m = length(&line)?,
                 "OUTERRADIUS" => found.outer_m = length(&line)?,
+                "MARKING" => found.is_marked = line.rest == BETWEEN_LANES,
                 "ENDCIRCLE" if found.outer_m <= found.inner_m => {
                     return Err(begin.error("OUTERRADIUS is not above INNERRADIUS"));
                 }

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use super::lines::OURS;
 use crate::roadmap::curve::Vertex;
 use crate::roadmap::{
-    Connector, Curve, DeclaredRoundabout, Lane, LaneId, LaneKind, PointId, Roadmap,
+    BETWEEN_LANES, Connector, Curve, DeclaredRoundabout, Lane, LaneId, LaneKind, PointId, Roadmap,
 };
 
 /// By the lane from which they lead.
@@ -212,6 +212,9 @@ impl Lines {
             self.put("LANETYPE", circle.kind.name());
             self.put("INNERRADIUS", circle.inner_m);
             self.put("OUTERRADIUS", circle.outer_m);
+            if circle.is_marked {
+                self.put("MARKING", BETWEEN_LANES);
+            }
             self.bare("ENDCIRCLE");
         }
         for junction in &roundabout.junctions {

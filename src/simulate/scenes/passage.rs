@@ -173,6 +173,7 @@ pub(super) fn roads(name: &str, passages: &[Passage], circles: &[Circle]) -> Roa
                 kind: circle.kind,
                 inner_m: circle.inner_m,
                 outer_m: circle.outer_m,
+                is_marked: false,
             })
             .collect(),
         junctions,
