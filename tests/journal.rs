@@ -6,7 +6,7 @@ use std::fs::File;
 use std::os::unix::fs::MetadataExt as _;
 use std::os::unix::net::UnixDatagram;
 use std::process::Command;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use nix::mount::{MsFlags, mount};
 use nix::sched::{CloneFlags, unshare};
@@ -30,7 +30,8 @@ fn journal() -> UnixDatagram {
     journal
 }
 
-/// What comes first of a daemon that logs to a file of which the environment says so much.
+/// What a daemon sends first to the journal, and writes to its log meanwhile, which is a file of which the environment says
+/// so much.
 fn logged(journal: &UnixDatagram, named: impl Fn(&File) -> String) -> (String, String) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("stderr");
@@ -45,6 +46,13 @@ fn logged(journal: &UnixDatagram, named: impl Fn(&File) -> String) -> (String, S
     // It is tried with an empty one first.
     let entries = (0..2).map(|_| journal.recv(&mut bytes).unwrap_or_default());
     let length = entries.max().unwrap_or_default();
+    let began = Instant::now();
+    while length == 0
+        && std::fs::read(&path).unwrap().is_empty()
+        && began.elapsed() < Duration::from_secs(10)
+    {
+        std::thread::sleep(Duration::from_millis(50));
+    }
     kill(Pid::from_raw(daemon.id() as i32), Signal::SIGTERM).unwrap();
     daemon.wait().unwrap();
     let entry = String::from_utf8_lossy(&bytes[..length]).into_owned();
@@ -69,7 +77,7 @@ fn the_journal_gets_priority_and_origin_and_a_terminal_gets_lines() {
             format!("{name}\n{length}{value}\n")
         };
         for (name, value) in [
-            ("PRIORITY", "5"),
+            ("PRIORITY", "6"),
             ("SYSLOG_IDENTIFIER", "kreisel"),
             ("TARGET", "kreisel::daemon"),
         ] {

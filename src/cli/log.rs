@@ -6,15 +6,18 @@ use std::os::fd::AsFd as _;
 use std::os::unix::fs::MetadataExt as _;
 
 use tracing::Level;
+use tracing_journald::{Priority, PriorityMappings};
 use tracing_subscriber::filter::LevelFilter;
 use tracing_subscriber::layer::SubscriberExt as _;
 use tracing_subscriber::util::SubscriberInitExt as _;
 
 /// What is logged from here on is told from this level up.
 pub(super) fn start(level: Level) {
-    let journal = journal().and_then(|()| tracing_journald::layer().ok());
-    if let Some(journal) = journal {
-        let journal = journal.with_syslog_identifier(env!("CARGO_PKG_NAME").into());
+    let journal = leads_to_journal().then(tracing_journald::layer);
+    if let Some(Ok(journal)) = journal {
+        let journal = journal
+            .with_syslog_identifier(env!("CARGO_PKG_NAME").into())
+            .with_priority_mappings(PRIORITIES);
         let log = tracing_subscriber::registry().with(LevelFilter::from_level(level));
         return log.with(journal).init();
     }
@@ -26,11 +29,24 @@ pub(super) fn start(level: Level) {
         .init();
 }
 
-/// Something if stderr leads to the journal: systemd names device and inode of what it has connected
+/// As syslog means them.
+const PRIORITIES: PriorityMappings = PriorityMappings {
+    error: Priority::Error,
+    warn: Priority::Warning,
+    info: Priority::Informational,
+    debug: Priority::Debug,
+    trace: Priority::Debug,
+};
+
+/// Whether stderr leads to the journal: systemd names device and inode of what it has connected
 /// (systemd.exec(5), `$JOURNAL_STREAM`).
-fn journal() -> Option<()> {
-    let named = std::env::var("JOURNAL_STREAM").ok()?;
-    let stderr = File::from(io::stderr().as_fd().try_clone_to_owned().ok()?);
-    let own = stderr.metadata().ok()?;
-    (named == format!("{}:{}", own.dev(), own.ino())).then_some(())
+fn leads_to_journal() -> bool {
+    let stderr = io::stderr().as_fd().try_clone_to_owned().map(File::from);
+    let (Ok(named), Ok(own)) = (
+        std::env::var("JOURNAL_STREAM"),
+        stderr.and_then(|stderr| stderr.metadata()),
+    ) else {
+        return false;
+    };
+    named == format!("{}:{}", own.dev(), own.ino())
 }

@@ -1,7 +1,7 @@
 //! What a track's existence is worth: how often somebody is there.
 
 /// Existence that the filters and the looks give, and the share of objects that have it at which a road user is; between
-/// two knots in proportion. `scripts/calibrate`; below the first knot nothing is known but the order.
+/// two knots in proportion. `scripts/calibrate`; up to 0.5, which stays so that the same is listed, only the order is known.
 const SHARES: [[f64; 2]; 12] = [
     [0.00, 0.000],
     [0.50, 0.500],

@@ -9,10 +9,15 @@ use tokio_tungstenite::tungstenite::Error;
 use tokio_tungstenite::tungstenite::error::ProtocolError;
 use tokio_tungstenite::tungstenite::handshake::machine::TryParse as _;
 use tokio_tungstenite::tungstenite::handshake::server::{Request, Response, write_response};
-use tokio_tungstenite::tungstenite::http::{HeaderValue, StatusCode, header};
+use tokio_tungstenite::tungstenite::http::{HeaderValue, Method, StatusCode, header};
 
 /// Longest head of a request, bytes.
-const LONGEST_HEAD: usize = 1 << 13;
+///
+/// Cookies belong to a host, whatever else it serves.
+const LONGEST_HEAD: usize = 1 << 15;
+
+/// Of what comes behind a request, so much is read before the connection is closed, bytes.
+const MOST_UNREAD: usize = 1 << 16;
 
 /// The page loads nothing from elsewhere, and no other page may frame it.
 const POLICY: &str = "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'";
@@ -49,13 +54,28 @@ impl Answer {
 pub(super) async fn read(
     stream: &mut TcpStream,
 ) -> io::Result<(Result<Request, StatusCode>, Vec<u8>)> {
+    /// A HEAD is a GET whose answer has no body; the parser knows GET alone.
+    const HEAD: &[u8] = b"HEAD ";
     let mut head = vec![];
+    let mut is_head = false;
     loop {
         if stream.read_buf(&mut head).await? == 0 {
             return Err(io::ErrorKind::UnexpectedEof.into());
         }
+        if head.len() < HEAD.len() {
+            continue;
+        }
+        if head.starts_with(HEAD) {
+            head.splice(..HEAD.len(), *b"GET ");
+            is_head = true;
+        }
         let refused = match Request::try_parse(&head) {
-            Ok(Some((length, request))) => return Ok((Ok(request), head.split_off(length))),
+            Ok(Some((length, mut request))) => {
+                if is_head {
+                    *request.method_mut() = Method::HEAD;
+                }
+                return Ok((Ok(request), head.split_off(length)));
+            }
             Ok(None) if head.len() < LONGEST_HEAD => continue,
             Ok(None) => StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE,
             Err(Error::Protocol(ProtocolError::WrongHttpMethod)) => StatusCode::METHOD_NOT_ALLOWED,
@@ -68,11 +88,15 @@ pub(super) async fn read(
     }
 }
 
-/// Sends an answer, the last one of a connection.
+/// Sends an answer, with its body or without, the last one of a connection.
 ///
 /// # Errors
 /// When the connection ends before.
-pub(super) async fn write(stream: &mut TcpStream, answer: &Answer) -> io::Result<()> {
+pub(super) async fn write(
+    stream: &mut TcpStream,
+    answer: &Answer,
+    with_body: bool,
+) -> io::Result<()> {
     let mut response = Response::new(());
     *response.status_mut() = answer.status;
     let headers = response.headers_mut();
@@ -82,20 +106,31 @@ pub(super) async fn write(stream: &mut TcpStream, answer: &Answer) -> io::Result
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
         (header::CACHE_CONTROL, "no-cache"),
         (header::CONNECTION, "close"),
+        (header::ALLOW, "GET, HEAD"),
     ] {
         headers.insert(name, HeaderValue::from_static(value));
     }
     headers.insert(header::CONTENT_LENGTH, answer.body.len().into());
-    switch(stream, &response).await?;
-    stream.write_all(answer.body.as_bytes()).await?;
-    stream.shutdown().await
+    write_head(stream, &response).await?;
+    if with_body {
+        stream.write_all(answer.body.as_bytes()).await?;
+    }
+    stream.shutdown().await?;
+    // What is left unread when a connection is closed takes the answer with it.
+    let mut rest = [0; 1024];
+    for _ in 0..MOST_UNREAD / rest.len() {
+        if stream.read(&mut rest).await? == 0 {
+            break;
+        }
+    }
+    Ok(())
 }
 
 /// Sends the head of a response alone.
 ///
 /// # Errors
 /// When the connection ends before.
-pub(super) async fn switch(stream: &mut TcpStream, response: &Response) -> io::Result<()> {
+pub(super) async fn write_head(stream: &mut TcpStream, response: &Response) -> io::Result<()> {
     let mut head = vec![];
     write_response(&mut head, response).map_err(io::Error::other)?;
     stream.write_all(&head).await
@@ -136,6 +171,8 @@ mod tests {
         assert_eq!(request.uri().path(), "/health");
         assert_eq!(request.headers()["host"], "localhost");
         assert_eq!(rest, b"more");
+        let (request, _) = read_of(&[b"HE", b"AD / HTTP/1.1\r\n\r\n"]).await.unwrap();
+        assert_eq!(request.unwrap().method(), Method::HEAD);
     }
 
     #[tokio::test]
@@ -150,6 +187,11 @@ mod tests {
         assert_eq!(
             refused(&[0xff; 4096]).await.unwrap(),
             Some(StatusCode::BAD_REQUEST)
+        );
+        let old = b"GET / HTTP/1.0\r\n\r\n";
+        assert_eq!(
+            refused(old).await.unwrap(),
+            Some(StatusCode::HTTP_VERSION_NOT_SUPPORTED)
         );
         let long = [&b"GET / HTTP/1.1\r\nHost: "[..], &[b'x'; LONGEST_HEAD]].concat();
         assert_eq!(

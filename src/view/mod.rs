@@ -2,7 +2,7 @@
 //!
 //! `labels` says what every point is, `picture` has the bytes of a revolution for the page, `feed` makes them where somebody looks, with the `newest` of
 //! what was published for those who have just come,
-//! `server` serves the page and sends them, by `http`, `page/` is the page, and `metrics` is for those who watch a daemon by
+//! `server` serves the page and sends them over `http`; `page/` is the page, and `metrics` is for those who watch a daemon by
 //! machine, with what `measures` keeps. The server has a thread of its
 //! own, and between it and the pipeline stands one picture, the newest: a viewer that stalls
 //! misses pictures, and nothing else happens.

@@ -14,7 +14,7 @@ use tokio::time::{sleep, timeout};
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::handshake::server::{Request, create_response};
 use tokio_tungstenite::tungstenite::http::uri::Authority;
-use tokio_tungstenite::tungstenite::http::{HeaderMap, StatusCode, header};
+use tokio_tungstenite::tungstenite::http::{HeaderMap, Method, StatusCode, header};
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 use tokio_tungstenite::tungstenite::{Bytes, Message};
 
@@ -32,7 +32,8 @@ const MOST_VIEWERS: usize = 64;
 /// Connections at a time; more wait.
 const MOST_CONNECTIONS: usize = 256;
 
-/// A connection over which nothing goes for so long is given up; pictures go ten times a second.
+/// A request, an answer, and a picture must be through in this time, and a viewer over whom nothing goes for so long is
+/// given up; pictures go ten times a second.
 const LONGEST_SILENCE: Duration = Duration::from_secs(30);
 
 /// Until connections are taken again after none could be.
@@ -129,6 +130,8 @@ async fn listen(listener: TcpListener, served: Served) -> io::Result<()> {
         };
         match listener.accept().await {
             Ok((stream, _)) => {
+                // The end of a picture must not wait until its begin is acknowledged.
+                let _ = stream.set_nodelay(true);
                 let served = served.clone();
                 tokio::spawn(async move {
                     answer(stream, served, LONGEST_SILENCE).await;
@@ -146,6 +149,9 @@ async fn answer(mut stream: TcpStream, served: Served, patience: Duration) {
     let Ok(Ok((request, rest))) = timeout(patience, http::read(&mut stream)).await else {
         return;
     };
+    let with_body = request
+        .as_ref()
+        .is_ok_and(|request| request.method() != Method::HEAD);
     let answer = match request {
         Ok(request) if !is_own_page(request.headers()) => Answer::text(
             StatusCode::FORBIDDEN,
@@ -164,7 +170,7 @@ async fn answer(mut stream: TcpStream, served: Served, patience: Duration) {
         Err(status) => Answer::text(status, ""),
     };
     // Who does not take it is gone.
-    let _ = timeout(patience, http::write(&mut stream, &answer)).await;
+    let _ = timeout(patience, http::write(&mut stream, &answer, with_body)).await;
 }
 
 /// What is found at a path.
@@ -211,11 +217,11 @@ async fn show(
 ) {
     let Ok(switching) = create_response(request) else {
         let answer = Answer::text(StatusCode::BAD_REQUEST, "this is a WebSocket");
-        let _ = timeout(patience, http::write(&mut stream, &answer)).await;
+        let _ = timeout(patience, http::write(&mut stream, &answer, true)).await;
         return;
     };
     if !matches!(
-        timeout(patience, http::switch(&mut stream, &switching)).await,
+        timeout(patience, http::write_head(&mut stream, &switching)).await,
         Ok(Ok(()))
     ) {
         return;

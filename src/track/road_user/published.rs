@@ -12,13 +12,13 @@ const THERE_M: f64 = 2.0;
 
 impl Track {
     /// The existence of a road user, by the track and what it looks like.
-    pub(super) fn road_user(&self) -> f64 {
+    fn road_user_existence(&self) -> f64 {
         self.existence.probability() * self.belief.road_user()
     }
 
     /// How likely it exists at most, wherever it is: never less than [`Object::existence`].
     pub(in crate::track) fn most_confidence(&self) -> f64 {
-        confidence(self.road_user())
+        confidence(self.road_user_existence())
     }
 
     /// What is published, valid at `end`.
@@ -60,7 +60,7 @@ impl Track {
                 .map(|axis| libm::sqrt(estimate.position_covariance[(axis, axis)])),
             yaw_deviation_rad: libm::sqrt(shape.yaw_variance),
             speed_deviation_mps: libm::sqrt(speed_variance),
-            existence: confidence(self.road_user() * there),
+            existence: confidence(self.road_user_existence() * there),
             first_seen: self.first_seen,
             seen_since: self.seen_since,
             last_measured: self.last_measured,

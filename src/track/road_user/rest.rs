@@ -30,7 +30,7 @@ impl Track {
         let is_known = self.is_confirmed() && (end - self.first_seen).seconds() > KNOWN_S;
         let was_there = self.points > 0;
         let stands = !self.moves && self.motion.standing() > 0.5;
-        let is_hardly = !self.is_published && self.road_user() < HARDLY * least_confidence;
+        let is_hardly = !self.is_published && self.most_confidence() < HARDLY * least_confidence;
         is_known && was_there && stands && is_hardly
     }
 }

@@ -44,8 +44,7 @@ impl Vacated {
             Some(sight) if sight.is_observable() => {
                 self.share += FRESH * (f64::from(sight.is_empty()) - self.share);
             }
-            Some(_) => {}
-            None => self.share *= LASTING,
+            Some(_) | None => self.share *= LASTING,
         }
     }
 }
