@@ -149,9 +149,8 @@ async fn answer(mut stream: TcpStream, served: Served, patience: Duration) {
     let Ok(Ok((request, rest))) = timeout(patience, http::read(&mut stream)).await else {
         return;
     };
-    let with_body = request
-        .as_ref()
-        .is_ok_and(|request| request.method() != Method::HEAD);
+    let is_head = |request: &Request| request.method() == Method::HEAD;
+    let with_body = !request.as_ref().is_ok_and(is_head);
     let answer = match request {
         Ok(request) if !is_own_page(request.headers()) => Answer::text(
             StatusCode::FORBIDDEN,
@@ -287,9 +286,8 @@ async fn send_pictures(
                     }
                 }
                 Ok(Some(Ok(_))) => {}
-                Ok(Some(Err(_)) | None) => return,
-                // Nothing was shown for so long, either: whoever is still there comes again.
-                Err(_) => return,
+                // It is gone, or nothing was shown for so long, either: whoever is still there comes again.
+                Ok(Some(Err(_)) | None) | Err(_) => return,
             },
         }
     }
@@ -349,6 +347,23 @@ mod tests {
         let mut answer = vec![];
         client.read_to_end(&mut answer).await.unwrap();
         assert_eq!(answer, b"");
+    }
+
+    #[tokio::test]
+    async fn what_is_refused_is_told_why_and_a_head_has_no_body() {
+        let answer_to = async |asked: &str| {
+            let (mut client, _served) = connected(Duration::from_secs(5)).await;
+            client.write_all(asked.as_bytes()).await.unwrap();
+            let mut answer = String::new();
+            client.read_to_string(&mut answer).await.unwrap();
+            answer
+        };
+        let refused = answer_to("POST / HTTP/1.1\r\nHost: localhost\r\n\r\n").await;
+        assert!(refused.starts_with("HTTP/1.1 405"), "{refused}");
+        assert!(refused.ends_with("\r\n\r\nMethod Not Allowed"), "{refused}");
+        let head = answer_to("HEAD / HTTP/1.1\r\nHost: localhost\r\n\r\n").await;
+        assert!(head.starts_with("HTTP/1.1 200"), "{head}");
+        assert!(head.ends_with("\r\n\r\n"), "{head}");
     }
 
     #[tokio::test]

@@ -154,7 +154,7 @@ impl Track {
         let is_moving = self.goes();
         let may_move = self.newness.allows_motion(self.usual_points);
         let shows_motion =
-            self.newness.left.is_sure() || self.trails.shows_motion(self.shape.seen_m[0], look);
+            self.newness.vacated.is_sure() || self.trails.shows_motion(self.shape.seen_m[0], look);
         if is_moving && may_move && shows_motion {
             self.moves = true;
             self.newness

@@ -12,7 +12,7 @@ pub(super) struct Newness {
     new: f64,
     old: f64,
     /// Whether nothing is left where it was.
-    pub(super) left: Vacated,
+    pub(super) vacated: Vacated,
     /// Where the object was when it was first seen to move to where nothing was, and how far it went from there.
     from_m: Option<Vector2<f64>>,
     way_m: f64,
@@ -36,7 +36,7 @@ impl Newness {
         Self {
             new: look.new,
             old: look.old,
-            left: Vacated::default(),
+            vacated: Vacated::default(),
             from_m: None,
             way_m: 0.0,
         }
@@ -63,19 +63,19 @@ impl Newness {
     /// Whether it is where nothing was, or nothing is where it was.
     pub(super) fn was_empty(&self, usual_points: f64) -> bool {
         let share = self.share(usual_points);
-        self.left.is_sure() || share.is_some_and(|share| share > LEAST_NEW)
+        self.vacated.is_sure() || share.is_some_and(|share| share > LEAST_NEW)
     }
 
     /// Whether it is where something stood.
     pub(super) fn was_occupied(&self, usual_points: f64) -> bool {
         let share = self.share(usual_points);
-        !self.left.is_sure() && share.is_some_and(|share| share < LEAST_MOVED)
+        !self.vacated.is_sure() && share.is_some_and(|share| share < LEAST_MOVED)
     }
 
     /// Whether it may have moved to where it is.
     pub(super) fn allows_motion(&self, usual_points: f64) -> bool {
         let share = self.share(usual_points);
-        self.left.is_sure() || share.is_none_or(|share| share > LEAST_NEW)
+        self.vacated.is_sure() || share.is_none_or(|share| share > LEAST_NEW)
     }
 
     /// Whether it only seems to move: it clings to something that stood there before it came.

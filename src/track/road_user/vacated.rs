@@ -55,7 +55,7 @@ impl Track {
         let place = self.left_place();
         let height_m = self.height_m();
         self.newness
-            .left
+            .vacated
             .learn(place.map(|place| sight(&place, height_m)));
     }
 
@@ -123,20 +123,20 @@ mod tests {
 
     #[test]
     fn who_walks_leaves_an_empty_place_and_what_is_seen_of_a_wall_leaves_the_wall() {
-        assert!(after(25, |_| 3000).newness.left.is_sure());
-        assert!(after(25, |_| 0).newness.left.is_sure());
+        assert!(after(25, |_| 3000).newness.vacated.is_sure());
+        assert!(after(25, |_| 0).newness.vacated.is_sure());
         let wall = after(25, |_| 1000);
-        assert!(wall.goes() && !wall.newness.left.is_sure());
+        assert!(wall.goes() && !wall.newness.vacated.is_sure());
     }
 
     #[test]
     fn nothing_is_known_of_a_place_that_something_hides() {
         let hidden = after(25, |column| if column < 200 { 500 } else { 3000 });
-        assert!(!hidden.newness.left.is_sure());
+        assert!(!hidden.newness.vacated.is_sure());
     }
 
     #[test]
     fn what_has_only_begun_to_go_has_left_nothing() {
-        assert!(!after(4, |_| 3000).newness.left.is_sure());
+        assert!(!after(4, |_| 3000).newness.vacated.is_sure());
     }
 }
