@@ -11,7 +11,7 @@ use crate::ego::{Ego, Placement, Sweep};
 use crate::grid::{Grid, Perceived};
 use crate::ground::{Ground, Origin, Plane};
 use crate::publish::{Heading, Publisher};
-use crate::roadmap::Roadmap;
+use crate::roadmap::{DrivenRoundabout, Roadmap};
 use crate::roundabout::{Advice, Sight, Situation, Watcher};
 use crate::time::Time;
 use crate::track::{Object, Scene, Tracker};
@@ -94,7 +94,7 @@ impl Pipeline {
             self.beams.reset();
             self.tracker.reset();
             self.grid.reset();
-            self.roundabouts.forget();
+            self.roundabouts.reset();
         }
         let time = self.scan.time();
         let missed = self.missed_before(time);
@@ -274,6 +274,11 @@ impl Pipeline {
     /// What was said of the nearest roundabout in the last revolution.
     pub fn advice(&self) -> Option<&Advice> {
         self.roundabouts.advice()
+    }
+
+    /// Roundabouts that no map knows, found by who drives round them, in the local frame.
+    pub fn found_roundabouts(&self) -> &[DrivenRoundabout] {
+        self.roundabouts.found()
     }
 
     /// Where the sensor was in the last revolution.

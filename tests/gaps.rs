@@ -33,11 +33,11 @@ fn nobody_is_sent_in_before_all_is_seen() {
                     matches!(hindrance, Some(Hindrance::Unseen | Hindrance::RoadUser(_)))
                 };
                 assert!(
-                    advice.arms.iter().all(|arm| waits(arm.hindrance)),
+                    advice.arms.iter().all(|arm| waits(arm.entry.hindrance)),
                     "{advice:?}"
                 );
             }
-            opened += advice.arms.iter().filter(|arm| arm.may_enter).count();
+            opened += advice.arms.iter().filter(|arm| arm.entry.may_go).count();
         }
     }
     assert!(opened > 0, "nobody is ever sent in");
@@ -86,4 +86,27 @@ fn every_revolution_has_its_message_where_a_map_is_given() {
     let (code, text) = run(&["process", &session, "--output", &out, "--map", &roads]);
     assert_eq!((code, text.lines().count()), (1, 1));
     assert!(text.contains("no roundabout is in it"), "{text}");
+}
+
+#[test]
+fn a_driver_who_heeds_the_advice_enters_and_hits_nobody() {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_kreisel"));
+    let output = command.args(["drive", "--seed", "21"]).output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    let line = |who: &str| said.lines().find(|line| line.starts_with(who)).unwrap();
+    let clean = "0 collisions, 0 near misses";
+    assert!(line("advised: waited").contains(clean), "{said}");
+    assert!(line("knowing: waited").contains(clean), "{said}");
+    // Who does not look runs into somebody.
+    assert!(
+        line("heedless: waited 0.0 s").contains("1 collisions"),
+        "{said}"
+    );
+    let output = Command::new(env!("CARGO_BIN_EXE_kreisel"))
+        .args(["drive", "street"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("no roundabout in street"), "{said}");
 }

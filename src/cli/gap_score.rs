@@ -4,7 +4,9 @@
 use std::collections::BTreeMap;
 
 use crate::roadmap::{LaneKind, Roadmap};
-use crate::roundabout::{Advice, Place, RoundaboutParameters, Situation, Watcher, Window};
+use crate::roundabout::{
+    Advice, Crossing, Place, RoundaboutParameters, Situation, Watcher, Window,
+};
 use crate::track::{Class, Object};
 
 /// A gap that one should not miss.
@@ -24,7 +26,9 @@ pub(super) struct GapScore {
     truth: Watcher,
     /// That should be left.
     margin_s: f64,
-    arms: Vec<ArmScore>,
+    /// Of each arm: its way in, and its way out.
+    entries: Vec<WayScore>,
+    exits: Vec<WayScore>,
     /// The arm that the vehicle was at first.
     own_arm: Option<usize>,
     revolutions: usize,
@@ -35,7 +39,7 @@ pub(super) struct GapScore {
 }
 
 #[derive(Debug, Default)]
-struct ArmScore {
+struct WayScore {
     was_open: bool,
     announced: usize,
     unsafe_goes: usize,
@@ -53,7 +57,8 @@ impl GapScore {
         Self {
             truth,
             margin_s: parameters.margin_s,
-            arms: vec![],
+            entries: vec![],
+            exits: vec![],
             own_arm: None,
             revolutions: 0,
             agreed: 0,
@@ -68,19 +73,17 @@ impl GapScore {
         let Some(true_advice) = self.truth.advice() else {
             return;
         };
-        self.arms
-            .resize_with(true_advice.arms.len(), ArmScore::default);
+        let count = true_advice.arms.len();
+        self.entries.resize_with(count, WayScore::default);
+        self.exits.resize_with(count, WayScore::default);
         self.own_arm = self.own_arm.or(true_advice.own_arm);
-        self.revolutions += true_advice.arms.len();
-        for ((score, said), known) in self
-            .arms
-            .iter_mut()
-            .zip(&advice.arms)
-            .zip(&true_advice.arms)
-        {
-            self.agreed += usize::from(said.may_enter == known.may_enter);
-            let short_s = self.margin_s - known.margin_s;
-            score.take(said.may_enter, known.may_enter, short_s, known.gap_s);
+        self.revolutions += count;
+        let arms = advice.arms.iter().zip(&true_advice.arms);
+        let scores = self.entries.iter_mut().zip(&mut self.exits);
+        for ((said, known), (entry, exit)) in arms.zip(scores) {
+            self.agreed += usize::from(said.entry.may_go == known.entry.may_go);
+            entry.take(&said.entry, &known.entry, self.margin_s);
+            exit.take(&said.exit, &known.exit, self.margin_s);
         }
         let pairs = pairs(objects, truth.objects);
         compare_lanes(&mut self.lanes, advice, true_advice, truth.objects, &pairs);
@@ -91,7 +94,7 @@ impl GapScore {
 
     /// Lines for people, and for scripts: of the vehicle's own arm, if it is at one, and of all.
     pub(super) fn summary(&self) -> String {
-        let own = self.own_arm.and_then(|arm| self.arms.get(arm..=arm));
+        let own = self.own_arm.and_then(|arm| self.entries.get(arm..=arm));
         let own = own.map(|own| format!("own arm: {}\n", gaps_of(own)));
         let mut errors_s = self.comings.errors_s.clone();
         errors_s.sort_by(f64::total_cmp);
@@ -104,10 +107,10 @@ impl GapScore {
         format!(
             "{}all {} arms: {}; {} decisions, of which {} as the rule on true road users; time to the conflict \
              point at 3 s off by {:.2} s median, {:.2} s at 95 % of {}; stay or exit right {}; lane right: cars {}, \
-             cyclists {}",
+             cyclists {}\nexits: {}",
             own.unwrap_or_default(),
-            self.arms.len(),
-            gaps_of(&self.arms),
+            self.entries.len(),
+            gaps_of(&self.entries),
             self.revolutions,
             self.agreed,
             quantile(0.5),
@@ -116,26 +119,29 @@ impl GapScore {
             share(self.comings.judged),
             share(self.lanes[0]),
             share(self.lanes[1]),
+            gaps_of(&self.exits),
         )
     }
 }
 
-/// How gaps were announced at arms.
-fn gaps_of(arms: &[ArmScore]) -> String {
-    let sum = |count: fn(&ArmScore) -> usize| arms.iter().map(count).sum::<usize>();
+/// How gaps were announced on ways.
+fn gaps_of(ways: &[WayScore]) -> String {
+    let sum = |count: fn(&WayScore) -> usize| ways.iter().map(count).sum::<usize>();
     format!(
         "{} gaps announced, {} unsafe, {} by more than {CLEARLY_S} s; {} of {} true gaps of {LONG_GAP_S} s missed",
-        sum(|arm| arm.announced),
-        sum(|arm| arm.unsafe_goes),
-        sum(|arm| arm.clearly_unsafe),
-        sum(|arm| arm.missed + usize::from(arm.gap == Some(false))),
-        sum(|arm| arm.gaps),
+        sum(|way| way.announced),
+        sum(|way| way.unsafe_goes),
+        sum(|way| way.clearly_unsafe),
+        sum(|way| way.missed + usize::from(way.gap == Some(false))),
+        sum(|way| way.gaps),
     )
 }
 
-impl ArmScore {
-    /// `short_s` is missing to the margin.
-    fn take(&mut self, said: bool, known: bool, short_s: f64, gap_s: f64) {
+impl WayScore {
+    fn take(&mut self, said: &Crossing, known: &Crossing, margin_s: f64) {
+        let short_s = margin_s - known.margin_s;
+        let gap_s = known.gap_s;
+        let (said, known) = (said.may_go, known.may_go);
         if said && !self.was_open {
             self.announced += 1;
             self.unsafe_goes += usize::from(!known);

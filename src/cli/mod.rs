@@ -24,6 +24,8 @@ mod convert;
 
 mod demo;
 
+mod drive;
+
 mod files;
 
 mod gap_score;
@@ -113,6 +115,8 @@ enum Command {
     View(view::Arguments),
     /// Say what is in a recording.
     Inspect(inspect::Arguments),
+    /// Let a simulated vehicle enter a roundabout when the advice allows it.
+    Drive(drive::Arguments),
     /// Say what roundabouts are in a map of roads.
     Roundabout(roundabout::Arguments),
     /// Print the complete configuration.
@@ -181,6 +185,7 @@ pub fn main() -> ExitCode {
         Command::Convert(arguments) => convert::run(&arguments),
         Command::View(arguments) => view::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Drive(arguments) => drive::run(&arguments),
         Command::Roundabout(arguments) => roundabout::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Health(arguments) => health::run(&arguments),

@@ -240,6 +240,10 @@ impl Process<'_> {
                 say!("{gaps}");
             }
         }
+        for found in self.pipeline.found_roundabouts() {
+            let reference = self.pipeline.sweep().reference;
+            say!("{}", super::roundabout::described_found(found, reference));
+        }
         if let Some(summary) = &self.summary {
             summary.print(&self.arguments.input)?;
         }

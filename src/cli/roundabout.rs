@@ -10,8 +10,8 @@ use super::files::{Output, check_distinct};
 use super::{Completion, roads};
 use crate::ego::geodesy::{Geodetic, LocalFrame};
 use crate::roadmap::{
-    ArmElements, Elements, LaneKind, Roadmap, Roundabout, SIMPLIFIED_WITHIN_M, Simplified,
-    roundabouts, scn, simplified, svg,
+    ArmElements, DrivenRoundabout, Elements, LaneKind, Roadmap, Roundabout, SIMPLIFIED_WITHIN_M,
+    Simplified, roundabouts, scn, simplified, svg,
 };
 
 #[derive(Debug, Args)]
@@ -210,6 +210,29 @@ fn described(arm: &ArmElements) -> String {
     format!(
         "arm at {bearing_deg:.0} degrees from north: {}",
         parts.join("; ")
+    )
+}
+
+/// A roundabout that no map knows, in a line; its place on the earth if that of the local frame is known.
+pub(super) fn described_found(found: &DrivenRoundabout, reference: Option<Geodetic>) -> String {
+    let roundabout = &found.roundabout;
+    let [x, y] = roundabout.centre_m();
+    let place = reference.map_or_else(
+        || format!("{x:.1} m, {y:.1} m"),
+        |reference| {
+            let place = LocalFrame::around(reference).geodetic([x, y, 0.0]);
+            format!("{:.7}, {:.7}", place.latitude_deg, place.longitude_deg)
+        },
+    );
+    let rings = roundabout.rings.iter().map(|ring| {
+        let kind = ring.kind.name();
+        format!("{kind} {:.1} to {:.1} m", ring.inner_m(), ring.outer_m())
+    });
+    format!(
+        "roundabout found by who drives round it: centre {place}; {}; {}; confidence {:.2}",
+        rings.collect::<Vec<_>>().join(", "),
+        counted(roundabout.arms.len(), "arm"),
+        found.confidence,
     )
 }
 

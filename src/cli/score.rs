@@ -14,6 +14,7 @@ use crate::ego::{Frame, Pose};
 use crate::pipeline::{Pipeline, RevolutionReport};
 use crate::roadmap::Roadmap;
 use crate::roundabout::{RoundaboutParameters, Situation};
+use crate::simulate::TrueObject;
 use crate::time::Time;
 use crate::track::{Class, Object};
 
@@ -33,8 +34,9 @@ struct TrueEgo {
     v: f64,
 }
 
+/// A true road user as truth files have it.
 #[derive(Debug, Deserialize)]
-struct TrueUser {
+pub(super) struct TrueUser {
     id: u32,
     #[serde(default)]
     class: String,
@@ -202,9 +204,29 @@ impl Score {
     }
 }
 
+impl From<&TrueObject> for TrueUser {
+    fn from(user: &TrueObject) -> Self {
+        let [x, y] = user.centre_m;
+        let [l, w, h] = user.size_m;
+        Self {
+            id: user.id,
+            class: user.class.name().to_owned(),
+            x,
+            y,
+            yaw: user.yaw_rad,
+            v: user.speed_mps,
+            yaw_rate: user.yaw_rate_radps,
+            l,
+            w,
+            h,
+            points: user.points,
+        }
+    }
+}
+
 impl TrueUser {
     /// As an object that is surely known, and always was.
-    fn object(&self, time: Time) -> Object {
+    pub(super) fn object(&self, time: Time) -> Object {
         Object {
             id: self.id,
             class: match self.class.as_str() {

@@ -21,6 +21,7 @@ pub(super) fn fill(message: &mut Roundabout, revolution: u32, advice: &Advice) {
     message.name.extend(advice.name.chars().take(LONGEST_NAME));
     [message.x, message.y] = advice.centre_m;
     message.diameter = advice.diameter_m as f32;
+    message.confidence = advice.confidence as f32;
     message.state = advice.state.number();
     message.own_arm = advice.own_arm.map_or(-1, |arm| arm as i32);
     let arms = advice.arms.iter().take(MOST_ARMS);
@@ -46,22 +47,38 @@ fn refill<T>(list: &mut List<T>, items: impl Iterator<Item = T>) {
 }
 
 fn arm_of(arm: &ArmAdvice) -> RoundaboutArm {
-    let (hindrance, hindering_object) = match arm.hindrance {
+    let ArmAdvice { entry, exit, .. } = arm;
+    let (hindrance, hindering_object) = numbers(entry.hindrance);
+    let (exit_hindrance, exit_hindering_object) = numbers(exit.hindrance);
+    RoundaboutArm {
+        bearing: arm.bearing_rad as f32,
+        may_enter: entry.may_go,
+        hindrance,
+        hindering_object,
+        gap: entry.gap_s as f32,
+        own_begin: entry.own_window_s[0] as f32,
+        own_end: entry.own_window_s[1] as f32,
+        margin: entry.margin_s as f32,
+        seen_share: entry.seen_share as f32,
+        may_leave: exit.may_go,
+        exit_hindrance,
+        exit_hindering_object,
+        exit_gap: exit.gap_s as f32,
+        exit_begin: exit.own_window_s[0] as f32,
+        exit_end: exit.own_window_s[1] as f32,
+        exit_margin: exit.margin_s as f32,
+        stop: entry.stop_m as f32,
+        exit_stop: exit.stop_m as f32,
+    }
+}
+
+/// A hindrance, and the road user of it.
+fn numbers(hindrance: Option<Hindrance>) -> (u32, u32) {
+    match hindrance {
         None => (0, 0),
         Some(Hindrance::RoadUser(id)) => (1, id),
         Some(Hindrance::Unseen) => (2, 0),
-        Some(Hindrance::NoEntry) => (3, 0),
-    };
-    RoundaboutArm {
-        bearing: arm.bearing_rad as f32,
-        may_enter: arm.may_enter,
-        hindrance,
-        hindering_object,
-        gap: arm.gap_s as f32,
-        own_begin: arm.own_window_s[0] as f32,
-        own_end: arm.own_window_s[1] as f32,
-        margin: arm.margin_s as f32,
-        seen_share: arm.seen_share as f32,
+        Some(Hindrance::NoWay) => (3, 0),
     }
 }
 
@@ -75,6 +92,7 @@ fn conflict_window(window: &Window) -> ConflictWindow {
         expected: window.expected_s as f32,
         probability: window.probability as f32,
         way: window.way_m as f32,
+        at_exit: window.at_exit,
     }
 }
 
@@ -115,6 +133,7 @@ mod tests {
         let window = Window {
             object_id: u32::MAX,
             arm: 1000,
+            at_exit: true,
             conflict: 0,
             kind: crate::roadmap::LaneKind::Pavement,
             begin_s: 14.0,

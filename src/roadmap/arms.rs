@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use super::network::Network;
 use super::rings::OFF_CIRCLE_M;
 use super::roundabout::{Access, Arm, Ring, Roundabout};
-use super::{Lane, LaneId, Polyline};
+use super::{Lane, LaneId, LaneKind, Polyline};
 
 /// How far from the circle arms are followed.
 pub(super) const REACH_M: f64 = 60.0;
@@ -52,10 +52,10 @@ pub(super) fn accesses(
         // Who leads on elsewhere, or comes from elsewhere, does not begin or end here.
         let (leads_on, comes_from) = (network.leads_on(lane.id), network.comes_from(lane.id));
         if into_ring.contains(&lane.id) || (!leads_on && meets(roundabout, way, true)) {
-            entries.push(access(lane, network.way_to(index), roundabout, true));
+            entries.push(access_by(lane, network.way_to(index), roundabout, true));
         }
         if from_ring.contains(&lane.id) || (!comes_from && meets(roundabout, way, false)) {
-            exits.push(access(lane, network.way_from(index), roundabout, false));
+            exits.push(access_by(lane, network.way_from(index), roundabout, false));
         }
     }
     (entries, exits)
@@ -90,8 +90,27 @@ fn meets(roundabout: &Roundabout, way: &Polyline, is_entry: bool) -> bool {
 const CORNER_M: f64 = 25.0;
 
 /// `whole` is the way in or out, of which the lane is the last or first piece.
-pub(super) fn access(
+pub(super) fn access_by(
     lane: &Lane,
+    whole: Polyline,
+    roundabout: &Roundabout,
+    is_entry: bool,
+) -> Access {
+    access(
+        lane.id,
+        lane.width_m(),
+        lane.kind,
+        whole,
+        roundabout,
+        is_entry,
+    )
+}
+
+/// The same of a way that no lane of a map describes.
+pub(super) fn access(
+    lane: LaneId,
+    width_m: f64,
+    kind: LaneKind,
     whole: Polyline,
     roundabout: &Roundabout,
     is_entry: bool,
@@ -115,9 +134,9 @@ pub(super) fn access(
         })
     });
     Access {
-        lane: lane.id,
-        width_m: lane.width_m(),
-        kind: lane.kind,
+        lane,
+        width_m,
+        kind,
         mouth_rad,
         bearing_rad,
         way,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::arms::{access, accesses, arms};
+use super::arms::{access_by, accesses, arms};
 use super::circle::Circle;
 use super::network::Network;
 use super::polyline::distance_m;
@@ -67,9 +67,9 @@ fn from_declared(network: &Network<'_>, declared: &DeclaredRoundabout) -> Rounda
         };
         let lane = &network.lanes[index];
         if is_entry {
-            entries.push(access(lane, network.way_to(index), &roundabout, true));
+            entries.push(access_by(lane, network.way_to(index), &roundabout, true));
         } else {
-            exits.push(access(lane, network.way_from(index), &roundabout, false));
+            exits.push(access_by(lane, network.way_from(index), &roundabout, false));
         }
     }
     let derived = || is_clockwise(&roundabout, &entries, &exits);

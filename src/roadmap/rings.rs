@@ -7,7 +7,7 @@ use super::circle::Circle;
 use super::network::Network;
 use super::polyline::distance_m;
 use super::roundabout::{Ring, Roundabout, Source};
-use super::{BETWEEN_LANES, Polyline};
+use super::{BETWEEN_LANES, LaneKind, Polyline};
 use crate::ego::wrapped_rad;
 
 /// Radii that the middle of a lane round a roundabout may have: the smallest mini roundabouts
@@ -25,30 +25,31 @@ pub(super) const SAME_CENTRE_M: f64 = 3.0;
 /// And their radii, if they are one lane.
 const SAME_RADIUS_M: f64 = 2.0;
 /// Less of the way round than this is a bend.
-const LEAST_COVERED: f64 = 0.5;
+pub(super) const LEAST_COVERED: f64 = 0.5;
 
 /// A piece of a lane that runs on a circle.
-struct Bend {
-    lane: usize,
+#[derive(Debug, Clone)]
+pub(super) struct Bend {
+    pub(super) lane: usize,
     points_m: Vec<[f64; 2]>,
     circle: Circle,
     /// To the left positive.
-    sweep_rad: f64,
+    pub(super) sweep_rad: f64,
 }
 
 /// Pieces of one lane of a circle.
-struct Group {
-    bends: Vec<Bend>,
-    circle: Circle,
+pub(super) struct Group {
+    pub(super) bends: Vec<Bend>,
+    pub(super) circle: Circle,
 }
 
 /// Pieces that lie on the same circle, driven the same way round.
-fn grouped(network: &Network<'_>, bends: Vec<Bend>) -> Vec<Group> {
+pub(super) fn grouped(kind_of: impl Fn(usize) -> LaneKind, bends: Vec<Bend>) -> Vec<Group> {
     let mut groups: Vec<Group> = vec![];
     // Groups by where they began: in squares as wide as what is near.
     let mut squares: BTreeMap<[i64; 2], Vec<usize>> = BTreeMap::new();
     for bend in bends {
-        let kind = network.lanes[bend.lane].kind;
+        let kind = kind_of(bend.lane);
         let square = bend
             .circle
             .centre_m
@@ -59,7 +60,7 @@ fn grouped(network: &Network<'_>, bends: Vec<Bend>) -> Vec<Group> {
         let home = near.copied().find(|&index| {
             let group: &Group = &groups[index];
             let first = &group.bends[0];
-            network.lanes[first.lane].kind == kind
+            kind_of(first.lane) == kind
                 && first.sweep_rad.signum() == bend.sweep_rad.signum()
                 && distance_m(group.circle.centre_m, bend.circle.centre_m) < SAME_CENTRE_M
                 && (group.circle.radius_m - bend.circle.radius_m).abs() < SAME_RADIUS_M
@@ -90,21 +91,32 @@ impl Group {
             .flat_map(|bend| bend.points_m.iter().copied())
     }
 
+    /// Its pieces' points.
+    pub(super) fn runs(&self) -> Vec<Vec<[f64; 2]>> {
+        self.bends
+            .iter()
+            .map(|bend| bend.points_m.clone())
+            .collect()
+    }
+
+    /// How far its pieces lead round, all together.
+    pub(super) fn swept_rad(&self) -> f64 {
+        self.bends.iter().map(|bend| bend.sweep_rad.abs()).sum()
+    }
+
     /// If it is one.
     fn roundabout(&self, network: &Network<'_>) -> Option<Roundabout> {
         let lanes: BTreeSet<usize> = self.bends.iter().map(|bend| bend.lane).collect();
         if !is_closed(network, &lanes) {
             return None;
         }
-        let runs = self.bends.iter().map(|bend| bend.points_m.clone());
         let is_clockwise = self.bends[0].sweep_rad < 0.0;
-        let runs = runs.collect();
         made(
             network,
             Source::Closed,
             &lanes,
             self.circle,
-            runs,
+            self.runs(),
             is_clockwise,
         )
     }
@@ -148,7 +160,7 @@ fn made(
 }
 
 /// By sectors of 5 degrees.
-fn covered_share(circle: &Circle, runs: &[Vec<[f64; 2]>]) -> f64 {
+pub(super) fn covered_share(circle: &Circle, runs: &[Vec<[f64; 2]>]) -> f64 {
     const SECTORS: usize = 72;
     let mut is_covered = [false; SECTORS];
     for pair in runs.iter().flat_map(|run| run.windows(2)) {
@@ -169,7 +181,7 @@ fn covered_share(circle: &Circle, runs: &[Vec<[f64; 2]>]) -> f64 {
 pub(super) fn closed(network: &Network<'_>) -> Vec<Roundabout> {
     let lanes = (0..network.lanes.len()).filter(|&lane| !network.lanes[lane].is_circular);
     let bends = bends_of(network, lanes);
-    let groups = grouped(network, bends);
+    let groups = grouped(|lane| network.lanes[lane].kind, bends);
     let rings = groups.iter().filter_map(|group| group.roundabout(network));
     rings.collect()
 }
@@ -304,7 +316,7 @@ fn is_closed(network: &Network<'_>, lanes: &BTreeSet<usize>) -> bool {
 }
 
 /// Pieces of a way that run on circles, one after the other, each as long as it goes.
-fn bends(lane: usize, way: &Polyline, off_m: f64) -> Vec<Bend> {
+pub(super) fn bends(lane: usize, way: &Polyline, off_m: f64) -> Vec<Bend> {
     let points_m = thinned(way);
     let mut found = vec![];
     let mut start = 0;

@@ -14,6 +14,8 @@ pub enum Source {
     Named,
     /// Its lanes close a circle.
     Closed,
+    /// No map knows it: road users drive round it.
+    Driven,
 }
 
 impl Source {
@@ -23,6 +25,7 @@ impl Source {
             Self::Declared => "declared",
             Self::Named => "named",
             Self::Closed => "closed circle of lanes",
+            Self::Driven => "driven round",
         }
     }
 }

@@ -43,8 +43,8 @@ pub enum Hindrance {
     RoadUser(u32),
     /// Somebody may come from where nothing is seen.
     Unseen,
-    /// The arm has no way in.
-    NoEntry,
+    /// The arm has no such way.
+    NoWay,
 }
 
 /// What is said of an arm.
@@ -52,18 +52,29 @@ pub enum Hindrance {
 pub struct ArmAdvice {
     /// Direction of the arm from the middle, counter-clockwise from east.
     pub bearing_rad: f64,
+    /// Into the circle, across the bikeway and the pavement around it.
+    pub entry: Crossing,
+    /// Out of it, across them.
+    pub exit: Crossing,
+}
+
+/// What is said of a way across others.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Crossing {
     /// Whether the gap is long enough.
-    pub may_enter: bool,
+    pub may_go: bool,
     /// Why not.
     pub hindrance: Option<Hindrance>,
-    /// Until the next road user may come to the circle's conflict point, seconds.
+    /// Until the next road user may come to a conflict point, seconds.
     pub gap_s: f64,
     /// When the vehicle would come to the first conflict point and leave the last one: the own one as it
-    /// goes, at other arms one that stands before it.
+    /// goes, elsewhere one that stands before it.
     pub own_window_s: [f64; 2],
     /// What is left of the gap when the vehicle is past, least of all conflict points.
     pub margin_s: f64,
-    /// Share of the circle on which nobody can be who was not seen.
+    /// From the vehicle's front to where it has to stand if it may not go; negative behind it.
+    pub stop_m: f64,
+    /// Share of the ways to be crossed on which nobody can be who was not seen.
     pub seen_share: f64,
 }
 
@@ -97,6 +108,8 @@ pub struct Advice {
     pub centre_m: [f64; 2],
     /// Outer diameter.
     pub diameter_m: f64,
+    /// 1 by a map; less where it was found by who drives round it.
+    pub confidence: f64,
     /// Its lanes, from the inside out, in the local frame.
     pub rings: Vec<Ring>,
     /// How far the vehicle has come.
@@ -111,40 +124,42 @@ pub struct Advice {
     pub users: Vec<UserOnLane>,
 }
 
-impl ArmAdvice {
-    /// An arm without a way in.
-    pub(super) fn closed(bearing_rad: f64) -> Self {
-        Self {
-            bearing_rad,
-            may_enter: false,
-            hindrance: Some(Hindrance::NoEntry),
-            gap_s: 0.0,
-            own_window_s: [0.0; 2],
-            margin_s: 0.0,
-            seen_share: 0.0,
-        }
+impl Crossing {
+    /// Where there is no way.
+    pub(super) const CLOSED: Self = Self {
+        may_go: false,
+        hindrance: Some(Hindrance::NoWay),
+        gap_s: 0.0,
+        own_window_s: [0.0; 2],
+        margin_s: 0.0,
+        stop_m: 0.0,
+        seen_share: 0.0,
+    };
+
+    /// Nobody is let through, whoever comes.
+    pub(super) fn hindered(&mut self, by: Hindrance) {
+        self.may_go = false;
+        self.hindrance = Some(by);
     }
 
     /// Whether the vehicle, as it goes, fits between those who come and those whom nobody sees.
     pub(super) fn of(
         asked: &Asked<'_>,
-        bearing_rad: f64,
         motion: &OwnMotion,
         comers: &[Window],
         unseen: Option<&Unseen>,
         parameters: &RoundaboutParameters,
     ) -> Self {
-        let &Asked { site, entry, .. } = asked;
         let mut advice = Self {
-            bearing_rad,
-            may_enter: true,
+            may_go: true,
             hindrance: None,
             gap_s: gap::HORIZON_S,
             own_window_s: [f64::INFINITY, 0.0],
             margin_s: gap::HORIZON_S,
+            stop_m: asked.stop_m - motion.front_m,
             seen_share: 1.0,
         };
-        for (number, conflict) in entry.conflicts.iter().enumerate() {
+        for (number, conflict) in asked.conflicts.iter().enumerate() {
             let [begin_s, end_s] = motion.window_s(conflict, parameters);
             if end_s <= 0.0 {
                 // Past it already.
@@ -170,7 +185,8 @@ impl ArmAdvice {
                 }
             }
             if let Some(unseen) = unseen {
-                let (comes_s, seen_share) = unseen.before(site, conflict, parameters.speed_mps);
+                let (comes_s, seen_share) =
+                    unseen.before(asked.site, conflict, parameters.speed_mps);
                 advice.seen_share = advice.seen_share.min(seen_share);
                 if comes_s - end_s < parameters.margin_s && advice.hindrance.is_none() {
                     advice.hindrance = Some(Hindrance::Unseen);
@@ -180,7 +196,7 @@ impl ArmAdvice {
         if !advice.own_window_s[0].is_finite() {
             advice.own_window_s[0] = 0.0;
         }
-        advice.may_enter = advice.hindrance.is_none();
+        advice.may_go = advice.hindrance.is_none();
         advice
     }
 }

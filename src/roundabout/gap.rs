@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use super::RoundaboutParameters;
 use super::lanes::{OnLane, Place, STAYS};
 use super::sight::fastest_mps;
-use super::site::{Conflict, Entry, Site};
+use super::site::{Conflict, Site};
 use crate::roadmap::LaneKind;
 use crate::time::Time;
 use crate::track::Object;
@@ -17,8 +17,10 @@ use crate::track::Object;
 pub struct Window {
     /// Whose.
     pub object_id: u32,
-    /// At which arm's way in.
+    /// At which arm.
     pub arm: usize,
+    /// Whether it is on the arm's way out, and not on its way in.
+    pub at_exit: bool,
     /// Which conflict point of that way, in the order in which they are met.
     pub conflict: usize,
     /// Of the way that is crossed.
@@ -35,10 +37,10 @@ pub struct Window {
     pub way_m: f64,
 }
 
-/// The own vehicle on its way in: how far its front is from the end of the way, and its speed.
+/// The own vehicle on its way in or out, and its speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct OwnMotion {
-    /// Place of its front along the way in.
+    /// Place of its front along the way; negative before its beginning.
     pub(super) front_m: f64,
     pub(super) speed_mps: f64,
 }
@@ -125,16 +127,22 @@ pub(super) struct Asked<'a> {
     pub(super) site: &'a Site,
     /// Number of the arm.
     pub(super) arm: usize,
-    /// Its way in.
-    pub(super) entry: &'a Entry,
+    /// Whether it is about its way out, and not about its way in.
+    pub(super) at_exit: bool,
+    /// Of that way.
+    pub(super) conflicts: &'a [Conflict],
+    /// Of that way.
+    pub(super) width_m: f64,
+    /// Where along it the front of a vehicle is that stands before all of them.
+    pub(super) stop_m: f64,
     pub(super) now: Time,
     /// As fast as anybody comes on the road.
     pub(super) road_mps: f64,
 }
 
-/// The windows of a road user at the conflict points of a way in.
+/// The windows of a road user at the conflict points of a way.
 pub(super) fn windows(asked: &Asked<'_>, user: &User<'_>, found: &mut Vec<Window>) {
-    for (number, conflict) in asked.entry.conflicts.iter().enumerate() {
+    for (number, conflict) in asked.conflicts.iter().enumerate() {
         let mut best: Option<Window> = None;
         for on in user.lanes {
             let approach = Approach::of(asked, conflict, user.object, on);
@@ -156,6 +164,7 @@ pub(super) fn windows(asked: &Asked<'_>, user: &User<'_>, found: &mut Vec<Window
             |window: &Window| window.probability >= LEAST_PROBABILITY && window.begin_s < HORIZON_S;
         found.extend(best.filter(counts).map(|window| Window {
             arm: asked.arm,
+            at_exit: asked.at_exit,
             conflict: number,
             kind: conflict.kind,
             ..window
@@ -259,7 +268,7 @@ impl Approach {
             } else {
                 [on.speed_mps.abs(), on.mean_speed_mps.abs()]
             },
-            zone_m: asked.entry.width_m / 2.0,
+            zone_m: asked.width_m / 2.0,
             fastest_mps: fastest_mps(conflict.kind, asked.road_mps),
             on_circle: matches!(on.place, Place::Ring(_)) && conflict.kind == LaneKind::Road,
             is_new: (asked.now - object.first_seen).seconds() < NEW_S,
@@ -288,6 +297,7 @@ impl Approach {
         (end_s > 0.0).then_some(Window {
             object_id: object.id,
             arm: 0,
+            at_exit: false,
             conflict: 0,
             kind: LaneKind::Road,
             begin_s,

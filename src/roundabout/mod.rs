@@ -5,6 +5,7 @@
 //! It advises, and is no safety function.
 
 mod advice;
+mod finder;
 mod gap;
 mod lanes;
 mod own;
@@ -14,16 +15,17 @@ mod site;
 use crate::ego::Pose;
 use crate::ego::geodesy::Geodetic;
 use crate::parameter::{Text, parameters};
-use crate::roadmap::{Origin, Roadmap, Roundabout, roundabouts, simplified};
+use crate::roadmap::{DrivenRoundabout, Origin, Roadmap, Roundabout, roundabouts, simplified};
 use crate::time::Time;
 use crate::track::Object;
-use gap::{Asked, Users};
+use finder::Finder;
+use gap::{Asked, OwnMotion, Users};
 use lanes::{Beliefs, Candidate};
-use own::{Own, standing};
+use own::{Own, standing, standing_inside};
 use sight::Unseen;
 use site::{Placing, Site};
 
-pub use advice::{Advice, ArmAdvice, Hindrance, State, UserOnLane};
+pub use advice::{Advice, ArmAdvice, Crossing, Hindrance, State, UserOnLane};
 pub use gap::Window;
 pub use lanes::{OnLane, Place};
 pub use sight::Sight;
@@ -41,6 +43,8 @@ parameters! {
         map_y_m: f64 = 0.0, in -100_000.0..=100_000.0, "m";
         /// How far the map's x axis is turned counter-clockwise from that frame's.
         map_turn_deg: f64 = 0.0, in -180.0..=180.0, "degrees";
+        /// Whether roundabouts that no map knows are found by who drives round them.
+        find: bool = true, thesis false, "";
         /// How the vehicle gathers speed when it enters.
         acceleration_mps2: f64 = 3.0, in 0.3..=8.0, "m/s^2";
         /// How it brakes before the circle.
@@ -84,7 +88,8 @@ pub struct Watcher {
     parameters: RoundaboutParameters,
     roundabouts: Vec<Roundabout>,
     origin: Option<Origin>,
-    /// Where they lie in the local frame, and by which placing.
+    finder: Finder,
+    /// Where they lie in the local frame, and by which placing; behind those of the map the ones that were found.
     sites: Vec<Site>,
     placing: Option<Placing>,
     /// The one that is watched, and what is remembered of it.
@@ -107,6 +112,7 @@ impl Watcher {
             parameters: parameters.clone(),
             roundabouts: vec![],
             origin: None,
+            finder: Finder::default(),
             sites: vec![],
             placing: None,
             watched: None,
@@ -130,9 +136,24 @@ impl Watcher {
         self.roundabouts.len()
     }
 
-    /// Forgets who was where.
-    pub fn forget(&mut self) {
+    /// Forgets who was where, and what was found.
+    pub fn reset(&mut self) {
+        self.forget();
+        self.finder = Finder::default();
+        self.placing = None;
+    }
+
+    /// Roundabouts that were found, where they lie in the local frame.
+    pub fn found(&self) -> &[DrivenRoundabout] {
+        self.finder.found()
+    }
+
+    fn forget(&mut self) {
         self.watched = None;
+        self.forget_users();
+    }
+
+    fn forget_users(&mut self) {
         self.advice.own_arm = None;
         self.beliefs.keep(|_| false);
         self.unseen = Unseen::default();
@@ -147,7 +168,9 @@ impl Watcher {
 
     /// Takes in a revolution.
     pub fn watch(&mut self, situation: &Situation<'_>) {
-        if self.roundabouts.is_empty() {
+        if self.parameters.find {
+            self.find(situation);
+        } else if self.roundabouts.is_empty() {
             return;
         }
         self.place(situation);
@@ -183,6 +206,24 @@ impl Watcher {
         self.advise(index, situation);
     }
 
+    /// Those who drive round what the map lacks.
+    fn find(&mut self, situation: &Situation<'_>) {
+        if !self.finder.take(situation) {
+            return;
+        }
+        let lanes = |watcher: &Self| {
+            let watched = watcher.watched.and_then(|index| watcher.sites.get(index));
+            watched.map(Site::lanes)
+        };
+        let before = lanes(self);
+        self.placing = None;
+        self.place(situation);
+        // What was remembered of lanes is of others.
+        if lanes(self) != before {
+            self.forget_users();
+        }
+    }
+
     /// The sites, where the local frame lies now.
     fn place(&mut self, situation: &Situation<'_>) {
         let placing = Placing {
@@ -198,6 +239,17 @@ impl Watcher {
                 .iter()
                 .map(|one| Site::placed(one, &placing));
             self.sites = placed.collect();
+            let known = self.sites.len();
+            for found in self.finder.found() {
+                let site = Site::found(found);
+                let is_known = |known: &Site| {
+                    let [x, y] = [0, 1].map(|axis| known.centre_m[axis] - site.centre_m[axis]);
+                    libm::hypot(x, y) < known.outer_m
+                };
+                if !self.sites[..known].iter().any(is_known) {
+                    self.sites.push(site);
+                }
+            }
         }
     }
 
@@ -222,6 +274,7 @@ impl Watcher {
         advice.name.clone_from(&site.name);
         advice.centre_m = site.centre_m;
         advice.diameter_m = 2.0 * site.outer_m;
+        advice.confidence = site.confidence;
         advice.rings.clone_from(&site.rings);
         advice.state = own.state;
         advice.own_arm = own.arm;
@@ -252,44 +305,80 @@ impl Watcher {
         windows: &mut Vec<Window>,
     ) -> ArmAdvice {
         let arm = &site.arms[number];
-        let own = Some(own).filter(|own| own.arm == Some(number));
-        let Some(entry) = arm.entries.get(own.map_or(0, |own| own.lane)) else {
-            return ArmAdvice::closed(arm.bearing_rad);
-        };
-        let waits = || standing(entry, self.parameters.own_length_m);
-        let motion = own.and_then(|own| own.motion).unwrap_or_else(waits);
         let asked = Asked {
             site,
             arm: number,
-            entry,
+            at_exit: false,
+            conflicts: &[],
+            width_m: 0.0,
+            stop_m: 0.0,
             now: situation.time,
             road_mps: self.parameters.speed_mps,
         };
+        let mut crossing = |asked: Asked<'_>, motion: &OwnMotion| {
+            self.crossing(&asked, motion, users, situation, windows)
+        };
+        let parameters = &self.parameters;
+        let entry_by = Some(own).filter(|own| own.arm == Some(number) && own.motion.is_some());
+        let entry = arm.entries.get(entry_by.map_or(0, |own| own.lane));
+        let entry = entry.map_or(Crossing::CLOSED, |entry| {
+            let waits = standing(entry, parameters.own_length_m);
+            let motion = entry_by.and_then(|own| own.motion).unwrap_or(waits);
+            let asked = Asked {
+                stop_m: waits.front_m,
+                conflicts: &entry.conflicts,
+                width_m: entry.width_m,
+                ..asked
+            };
+            let mut said = crossing(asked, &motion);
+            if let Some(ahead) = entry_by.and_then(|own| own.ahead(entry, users)) {
+                said.margin_s = 0.0;
+                said.hindered(Hindrance::RoadUser(ahead));
+            }
+            said
+        });
+        let exit = arm.exits.first().map_or(Crossing::CLOSED, |exit| {
+            let waits = standing_inside(exit);
+            let motion = own.leaving(site, exit, situation, parameters);
+            let motion = motion.unwrap_or(waits);
+            let asked = Asked {
+                stop_m: waits.front_m,
+                at_exit: true,
+                conflicts: &exit.conflicts,
+                width_m: exit.width_m,
+                ..asked
+            };
+            crossing(asked, &motion)
+        });
+        ArmAdvice {
+            bearing_rad: arm.bearing_rad,
+            entry,
+            exit,
+        }
+    }
+
+    /// What is said of a way in or out.
+    fn crossing(
+        &self,
+        asked: &Asked<'_>,
+        motion: &OwnMotion,
+        users: Users<'_>,
+        situation: &Situation<'_>,
+        windows: &mut Vec<Window>,
+    ) -> Crossing {
         let first = windows.len();
         users
             .iter()
-            .for_each(|user| gap::windows(&asked, &user, windows));
+            .for_each(|user| gap::windows(asked, &user, windows));
         let unseen = situation.sight.map(|_| &self.unseen);
-        let mut advice = ArmAdvice::of(
-            &asked,
-            arm.bearing_rad,
-            &motion,
-            &windows[first..],
-            unseen,
-            &self.parameters,
-        );
-        if let Some(ahead) = own.and_then(|own| own.ahead(entry, users)) {
-            advice.may_enter = false;
-            advice.margin_s = 0.0;
-            advice.hindrance = Some(Hindrance::RoadUser(ahead));
-        }
+        let comers = &windows[first..];
+        let mut said = Crossing::of(asked, motion, comers, unseen, &self.parameters);
         let since = self.since.unwrap_or(situation.time);
         let is_fresh = (situation.time - since).seconds() < FIRST_LOOK_S;
         if is_fresh && situation.sight.is_some() {
-            advice.may_enter = false;
-            advice.hindrance = advice.hindrance.or(Some(Hindrance::Unseen));
+            said.hindered(said.hindrance.unwrap_or(Hindrance::Unseen));
         }
-        advice
+        said
     }
 }
 

@@ -3,13 +3,23 @@
 use super::advice::State;
 use super::gap::{OwnMotion, Users};
 use super::lanes::Place;
-use super::site::{Entry, Site};
+use super::site::{Entry, Exit, Site};
 use super::{RoundaboutParameters, Situation};
+use crate::ego::Pose;
 use crate::ego::wrapped_rad;
-use crate::roadmap::Polyline;
+use crate::roadmap::{Polyline, Station};
 
 /// Distance before a conflict zone at which one stands.
 const STOP_M: f64 = 1.0;
+
+/// A vehicle that waits to leave, before the first way that it has to cross.
+pub(super) fn standing_inside(exit: &Exit) -> OwnMotion {
+    let first = exit.conflicts.first();
+    OwnMotion {
+        front_m: first.map_or(0.0, |conflict| conflict.zone_m[0] - STOP_M),
+        speed_mps: 0.0,
+    }
+}
 
 /// A vehicle that waits: as near to the circle as it can stand without being in anybody's way.
 pub(super) fn standing(entry: &Entry, own_length_m: f64) -> OwnMotion {
@@ -54,9 +64,6 @@ impl Own {
         last_arm: Option<usize>,
         parameters: &RoundaboutParameters,
     ) -> Self {
-        /// A vehicle is on a way if it is no farther off than half a lane, and points along it.
-        const ASIDE_M: f64 = 2.5;
-        const TURNED_RAD: f64 = 0.6;
         let Some(pose) = situation.vehicle else {
             return Self::WATCHING;
         };
@@ -66,17 +73,12 @@ impl Own {
             x + parameters.own_front_m * cosine,
             y + parameters.own_front_m * sine,
         ];
-        let is_on = |way: &Polyline| {
-            let station = way.nearest([x, y])?;
-            let turned_rad = wrapped_rad(pose.yaw_rad - station.heading_rad);
-            (station.distance_m < ASIDE_M && turned_rad.abs() < TURNED_RAD).then_some(station)
-        };
         let speed_mps = situation.vehicle_speed_mps.max(0.0);
         let away_m = libm::hypot(x - site.centre_m[0], y - site.centre_m[1]);
         let is_inside = away_m < site.outer_m;
         for (arm, ways) in site.arms.iter().enumerate() {
             for (lane, entry) in ways.entries.iter().enumerate() {
-                let Some(station) = is_on(&entry.way) else {
+                let Some(station) = on_way(&entry.way, pose) else {
                     continue;
                 };
                 if is_inside && last_arm != Some(arm) {
@@ -104,7 +106,11 @@ impl Own {
             };
         }
         for (arm, ways) in site.arms.iter().enumerate() {
-            if ways.exits.iter().any(|exit| is_on(&exit.way).is_some()) {
+            if ways
+                .exits
+                .iter()
+                .any(|exit| on_way(&exit.way, pose).is_some())
+            {
                 return Self {
                     state: State::Leaving,
                     arm: Some(arm),
@@ -116,7 +122,43 @@ impl Own {
     }
 }
 
+/// Where a vehicle is on a way, if it is no farther off than half a lane, and points along it.
+fn on_way(way: &Polyline, pose: Pose) -> Option<Station> {
+    const ASIDE_M: f64 = 2.5;
+    const TURNED_RAD: f64 = 0.6;
+    let station = way.nearest([pose.position_m[0], pose.position_m[1]])?;
+    let turned_rad = wrapped_rad(pose.yaw_rad - station.heading_rad);
+    (station.distance_m < ASIDE_M && turned_rad.abs() < TURNED_RAD).then_some(station)
+}
+
 impl Own {
+    /// The vehicle on its way to leave by an exit, if it is on the circle or on that way.
+    pub(super) fn leaving(
+        &self,
+        site: &Site,
+        exit: &Exit,
+        situation: &Situation<'_>,
+        parameters: &RoundaboutParameters,
+    ) -> Option<OwnMotion> {
+        let pose = situation.vehicle?;
+        let at_m = [pose.position_m[0], pose.position_m[1]];
+        if !matches!(self.state, State::Circling | State::Leaving) {
+            return None;
+        }
+        let along_m = match on_way(&exit.way, pose) {
+            Some(station) => station.along_m,
+            None if self.state == State::Circling => {
+                let circle = site.rings[site.outermost_road()?].circle;
+                -circle.radius_m * site.round_rad(circle.angle_rad(at_m), exit.mouth_rad)
+            }
+            None => return None,
+        };
+        Some(OwnMotion {
+            front_m: along_m + parameters.own_front_m,
+            speed_mps: situation.vehicle_speed_mps.max(0.0),
+        })
+    }
+
     /// Somebody who stands or goes before the vehicle on its own way in.
     pub(super) fn ahead(&self, entry: &Entry, users: Users<'_>) -> Option<u32> {
         let front_m = self.motion?.front_m;

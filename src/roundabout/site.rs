@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use crate::ego::geodesy::LocalFrame;
 use crate::ego::wrapped_rad;
-use crate::roadmap::{Access, LaneKind, Origin, Polyline, Ring, Roundabout};
+use crate::roadmap::{Access, DrivenRoundabout, LaneKind, Origin, Polyline, Ring, Roundabout};
 
 /// How a map's places become the local frame's.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,6 +55,8 @@ pub(super) struct Exit {
     pub(super) width_m: f64,
     /// Where it leaves the circle.
     pub(super) mouth_rad: f64,
+    /// Bikeways and pavements that it crosses, in the order in which they are met.
+    pub(super) conflicts: Vec<Conflict>,
 }
 
 /// Where the way in or out of an arm crosses a ring.
@@ -89,6 +91,8 @@ pub(super) struct Site {
     pub(super) rings: Vec<Ring>,
     pub(super) is_clockwise: bool,
     pub(super) arms: Vec<SiteArm>,
+    /// That there is one.
+    pub(super) confidence: f64,
 }
 
 impl Site {
@@ -105,6 +109,7 @@ impl Site {
             rings: rings.collect(),
             is_clockwise: roundabout.is_clockwise,
             arms: vec![],
+            confidence: 1.0,
         };
         let arms = roundabout.arms.iter().map(|arm| {
             let roads = |accesses: &[Access]| -> Vec<(Polyline, f64)> {
@@ -136,6 +141,27 @@ impl Site {
         });
         site.arms = arms.collect();
         site
+    }
+
+    /// One that was found where it lies in the local frame.
+    pub(super) fn found(found: &DrivenRoundabout) -> Self {
+        let here = Placing {
+            reference: None,
+            origin: None,
+            shift_m: [0.0; 2],
+            turn_rad: 0.0,
+        };
+        Self {
+            confidence: found.confidence,
+            ..Self::placed(&found.roundabout, &here)
+        }
+    }
+
+    /// How many rings, and how many ways in and out of each arm.
+    pub(super) fn lanes(&self) -> (usize, Vec<[usize; 2]>) {
+        let arms = self.arms.iter();
+        let ways = arms.map(|arm| [arm.entries.len(), arm.exits.len()]);
+        (self.rings.len(), ways.collect())
     }
 
     fn bearing_rad(&self, entries: &[Entry], exits: &[Exit]) -> f64 {
@@ -186,7 +212,9 @@ impl Site {
     fn entry(&self, way: &Polyline, width_m: f64) -> Option<Entry> {
         let road = self.outermost_road()?;
         let way = self.prolonged(way, road)?;
-        let conflicts = self.crossings(&way, road);
+        let mut conflicts = self.crossings(&way);
+        conflicts.retain(|conflict| conflict.ring != road);
+        conflicts.push(self.conflict(&way, road, way.length_m()));
         Some(Entry {
             way,
             width_m,
@@ -197,10 +225,13 @@ impl Site {
     fn exit(&self, way: &Polyline, width_m: f64) -> Option<Exit> {
         let road = self.outermost_road()?;
         let way = self.prolonged(&way.reversed(), road)?.reversed();
+        let mut conflicts = self.crossings(&way);
+        conflicts.retain(|conflict| conflict.kind != LaneKind::Road);
         Some(Exit {
             mouth_rad: self.angle_rad(*way.points_m().first()?),
             way,
             width_m,
+            conflicts,
         })
     }
 
@@ -238,14 +269,10 @@ impl Site {
         Some(Polyline::through(points_m.iter().copied().chain([met_m])))
     }
 
-    /// Rings that a way crosses, and the one that it ends on.
-    fn crossings(&self, way: &Polyline, ends_on: usize) -> Vec<Conflict> {
+    /// Rings whose middle a way crosses.
+    fn crossings(&self, way: &Polyline) -> Vec<Conflict> {
         let mut found = vec![];
         for (index, ring) in self.rings.iter().enumerate() {
-            if ends_on == index {
-                found.push(self.conflict(way, index, way.length_m()));
-                continue;
-            }
             let mut along_m = 0.0;
             for pair in way.points_m().windows(2) {
                 let length_m = libm::hypot(pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]);

@@ -32,6 +32,7 @@ mod solid;
 mod terrain;
 
 use crate::cloud::sensor::VLP16;
+use crate::ego::geodesy::{Geodetic, LocalFrame};
 use crate::random::Random;
 use crate::time::{Span, Time};
 use crate::wire::envelope::Postmark;
@@ -41,6 +42,7 @@ use fixes::Receiver;
 use map::{Surveyor, TrueMap};
 use packets::PacketStream;
 use path::Moment;
+use path::Path;
 use scenario::{Class, PoseMessages, Scenario, Scene};
 use sight::{Carrier, Sight, Surface};
 use solid::Hit;
@@ -155,6 +157,26 @@ impl Simulation {
         }
     }
 
+    /// Where the frame of the truth lies on the earth: its origin is where the sensor was at the beginning.
+    pub fn reference(&self) -> Geodetic {
+        let [x, y, _] = Carrier::of(&self.scene, 0.0).sensor_m;
+        LocalFrame::around(fixes::REFERENCE).geodetic([x, y, 0.0])
+    }
+
+    /// The way that the vehicle goes.
+    pub fn way_of_ego(&self) -> &Path {
+        &self.scene.ego
+    }
+
+    /// From the end of the last revolution on the vehicle changes its speed evenly, so that it has this one at the end
+    /// of the next, whatever its scenario says.
+    pub fn drive(&mut self, speed_mps: f64) {
+        let from_s = seconds_of(self.column);
+        self.scene
+            .ego
+            .driven(from_s, from_s + 1.0 / ROTATION_HZ, speed_mps);
+    }
+
     /// From now on notes what the true map of the scene looks like, for [`Simulation::map`].
     pub fn survey(&mut self) {
         self.surveyor = Some(Surveyor::default());
@@ -193,6 +215,16 @@ impl Simulation {
         };
         postmark.put_payload(out, POINT_CLOUD_ID, |out| cloud.encode(out));
         self.truth(time, &hits)
+    }
+
+    /// As long as a turn takes, without any ray. Gives the truth at its end.
+    pub fn pass(&mut self) -> Truth {
+        let turn = turn_of(self.column);
+        while turn_of(self.column) == turn {
+            self.column += 1;
+        }
+        let time = EPOCH + Span::from_seconds(seconds_of(self.column));
+        self.truth(time, &vec![0; self.scene.actors.len()])
     }
 
     /// Turns the sensor once, and hands over what it sends meanwhile. Gives the truth at the end of the revolution,

@@ -126,6 +126,14 @@ impl Path {
         self
     }
 
+    /// Forgets the speeds after a time, and goes over to another one until a later time.
+    pub fn driven(&mut self, from_s: f64, until_s: f64, speed_mps: f64) {
+        let (_, now_mps, _) = self.progress(from_s);
+        self.speeds.retain(|(at_s, _)| *at_s < from_s);
+        self.speeds
+            .extend([(from_s, now_mps), (until_s, speed_mps)]);
+    }
+
     /// Length of its pieces; beyond it goes straight on.
     pub fn length_m(&self) -> f64 {
         self.pieces.iter().map(|piece| piece.length_m).sum()

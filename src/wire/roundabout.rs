@@ -10,7 +10,7 @@ super::message! {
         /// Whether the gap is long enough to enter now.
         2 => may_enter: bool,
         /// Why not. 0: one may; 1: a road user comes or is in the way; 2: somebody may come from where nothing is seen; 3: the
-        /// arm has no way in.
+        /// arm has no such way.
         3 => hindrance: u32,
         /// The road user who comes first, of hindrance 1.
         4 => hindering_object: u32,
@@ -25,11 +25,31 @@ super::message! {
         8 => margin: f32,
         /// Share of the circle on which nobody can be who was not seen, 0 to 1.
         9 => seen_share: f32,
+        /// Whether the gap is long enough to leave by this arm now, across the bikeway and the pavement around the circle.
+        10 => may_leave: bool,
+        /// Why not, as for entering.
+        11 => exit_hindrance: u32,
+        /// The road user who comes first, of exit hindrance 1.
+        12 => exit_hindering_object: u32,
+        /// Until the next road user may come to a conflict point of the way out, seconds; at most 15.
+        13 => exit_gap: f32,
+        /// When the vehicle would come to the first of them, seconds from now: the own one as it goes round, where it is not on
+        /// the circle one that stands before them.
+        14 => exit_begin: f32,
+        /// When it would leave the last one, seconds from now.
+        15 => exit_end: f32,
+        /// What is left between its leaving and the next road user's coming, seconds; least of all of them.
+        16 => exit_margin: f32,
+        /// From the vehicle's front to where it has to stand if it may not enter, metres; negative behind it. Where it is not on
+        /// this way in, 0.
+        17 => stop: f32,
+        /// The same if it may not leave.
+        18 => exit_stop: f32,
     }
 }
 
 super::message! {
-    /// When a road user is where the way into an arm crosses its own.
+    /// When a road user is where the way into an arm, or out of it, crosses its own.
     pub struct ConflictWindow = 2027 "kreisel.ConflictWindow" {
         /// Whose.
         1 => object_id: u32,
@@ -47,6 +67,8 @@ super::message! {
         7 => probability: f32,
         /// Its way to the conflict point, metres.
         8 => way: f32,
+        /// Whether it is the arm's way out that is crossed, and not its way in.
+        9 => at_exit: bool,
     }
 }
 
@@ -81,7 +103,7 @@ super::message! {
 }
 
 super::message! {
-    /// The nearest roundabout of the map: road users on its lanes, and at each arm the gap. Advice, no command.
+    /// The nearest roundabout: road users on its lanes, and at each arm the gap. Advice, no command.
     pub struct Roundabout = 2024 "kreisel.Roundabout" {
         /// That of the object list of the same revolution.
         1 => revolution: u32,
@@ -106,5 +128,7 @@ super::message! {
         10 => users: List<LaneUser>,
         /// Lanes of the circle from the inside out, each with its length before it.
         11 => rings: List<RoundaboutRing>,
+        /// How much speaks for it. 1: a map knows it; less: it was found by who drives round it.
+        12 => confidence: f32,
     }
 }

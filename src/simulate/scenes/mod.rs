@@ -46,6 +46,18 @@ pub(super) const ALL: &[Scenario] = &[
         roads: Some(traffic::two_lane_roads),
     },
     Scenario {
+        name: "roundabout-entry",
+        summary: "the small roundabout with traffic; the vehicle comes from 60 m before it, and stands before it",
+        build: traffic::small_entry,
+        roads: Some(traffic::small_roads),
+    },
+    Scenario {
+        name: "two-lane-entry",
+        summary: "the same at the one with two lanes",
+        build: traffic::two_lane_entry,
+        roads: Some(traffic::two_lane_roads),
+    },
+    Scenario {
         name: "street",
         summary: "a street with parked cars, oncoming traffic, a bus, a cyclist, pedestrians, \
                   and a turn to the right",

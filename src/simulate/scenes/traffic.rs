@@ -68,6 +68,35 @@ pub(super) fn two_lane(random: &mut Random) -> Scene {
     scene(random, &TWO_LANE, 22.6, 26.5, 13)
 }
 
+pub(super) fn small_entry(random: &mut Random) -> Scene {
+    entering(small(random), &SMALL, random)
+}
+
+pub(super) fn two_lane_entry(random: &mut Random) -> Scene {
+    let scene = two_lane(random);
+    entering(scene, &TWO_LANE[1], random)
+}
+
+/// The vehicle comes along its arm to where it waits else, and would leave by the first exit or straight on.
+fn entering(scene: Scene, passage: &Passage, random: &mut Random) -> Scene {
+    /// Way to where it waits.
+    const WAY_M: f64 = 60.0;
+    const BRAKES_S: f64 = 4.0;
+    let exit = 1 + random.below(2) as u32;
+    // From the begin of the way to where the bend into the circle begins.
+    let bend_m = -passage.path(EGO_DEG, 0.0, exit).at(0.0).position_m[1];
+    let approach_m = WAY_M - bend_m;
+    let even_s = (WAY_M - APPROACH_MPS * BRAKES_S / 2.0) / APPROACH_MPS;
+    Scene {
+        ego: passage.path(EGO_DEG, approach_m, exit).timed(&[
+            (0.0, APPROACH_MPS),
+            (even_s, APPROACH_MPS),
+            (even_s + BRAKES_S, 0.0),
+        ]),
+        ..scene
+    }
+}
+
 /// Cars begin as far away as they must to come when they do: nobody stands and waits for his turn.
 fn scene(
     random: &mut Random,

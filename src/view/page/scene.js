@@ -119,16 +119,23 @@ function drawRoundabout(context, camera, { roundabout, groundZ }, colours) {
     context.stroke();
   };
   arms.forEach((arm, number) => {
-    if (arm.hindrance === 3) return;
     context.save();
     context.rotate(arm.bearing);
+    // On the side on which one drives in, and on the one on which one drives out.
+    const way = (atExit, mayGo, gap, own, aside) => {
+      bar(0, gap, aside, mayGo ? colours.path : colours.stop);
+      bar(...own, aside + 0.9, colours.vehicle);
+      for (const window of windows.filter((window) => window.arm === number && window.atExit === atExit)) {
+        context.globalAlpha = Math.max(0.2, window.probability);
+        bar(window.begin, window.end, aside - 0.9, colours.p99);
+      }
+      context.globalAlpha = 1;
+    };
     context.lineWidth = number === ownArm ? 0.8 : 0.4;
-    bar(0, arm.gap, 0, arm.mayEnter ? colours.path : colours.stop);
-    bar(arm.ownBegin, arm.ownEnd, 0.9, colours.vehicle);
-    for (const window of windows.filter((window) => window.arm === number)) {
-      context.globalAlpha = Math.max(0.2, window.probability);
-      bar(window.begin, window.end, -0.9, colours.p99);
-    }
+    if (arm.hindrance !== 3) way(false, arm.mayEnter, arm.gap, [arm.ownBegin, arm.ownEnd], 1.6);
+    // Where nothing is crossed on the way out there is nothing to say.
+    context.lineWidth = 0.4;
+    if (arm.exitEnd > 0) way(true, arm.mayLeave, arm.exitGap, [arm.exitBegin, arm.exitEnd], -1.6);
     context.restore();
   });
   context.restore();

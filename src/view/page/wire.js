@@ -32,9 +32,12 @@ const STATUS = {
 
 const ARM = {
   1: ["bearing", f32], 2: ["mayEnter", bool], 3: ["hindrance", u32], 4: ["hinderingObject", u32], 5: ["gap", f32],
-  6: ["ownBegin", f32], 7: ["ownEnd", f32],
+  6: ["ownBegin", f32], 7: ["ownEnd", f32], 10: ["mayLeave", bool], 13: ["exitGap", f32], 14: ["exitBegin", f32],
+  15: ["exitEnd", f32],
 };
-const WINDOW = { 1: ["object", u32], 2: ["arm", u32], 4: ["begin", f32], 5: ["end", f32], 7: ["probability", f32] };
+const WINDOW = {
+  1: ["object", u32], 2: ["arm", u32], 4: ["begin", f32], 5: ["end", f32], 7: ["probability", f32], 9: ["atExit", bool],
+};
 const RING = { 1: ["kind", u32], 2: ["radius", f32], 3: ["width", f32] };
 const ROUNDABOUT = {
   2: ["name", text], 3: ["x", f64], 4: ["y", f64], 5: ["diameter", f32], 6: ["state", u32], 7: ["ownArm", s32],

@@ -1,0 +1,228 @@
+//! What becomes of a drive: collisions and near misses, by the boxes of all at all times.
+
+use super::driver::{Driver, Part};
+use crate::ego::wrapped_rad;
+use crate::roundabout::RoundaboutParameters;
+use crate::simulate::Truth;
+
+/// Who comes to where the vehicle was, within this time after it, is nearly missed (Allen and others 1978: the
+/// post-encroachment time).
+const NEAR_MISS_S: f64 = 1.0;
+/// Width of the vehicle.
+const WIDTH_M: f64 = 1.8;
+/// Traffic does not see the vehicle: who goes its way, within this, and faster, runs into it where others would brake.
+const SAME_WAY_RAD: f64 = 0.6;
+
+/// A rectangle on the ground.
+#[derive(Debug, Clone, Copy)]
+struct Footprint {
+    centre_m: [f64; 2],
+    yaw_rad: f64,
+    half_m: [f64; 2],
+}
+
+pub(super) struct Judge {
+    own_length_m: f64,
+    own_front_m: f64,
+    revolutions: Vec<Revolution>,
+    entered_s: Option<f64>,
+}
+
+struct Revolution {
+    time_s: f64,
+    part: Part,
+    own: Footprint,
+    others: Vec<Footprint>,
+}
+
+/// What became of a drive.
+pub(super) struct Outcome {
+    /// When the vehicle was on the circle, from the begin of the drive.
+    pub(super) entered_s: Option<f64>,
+    /// With how many it collided.
+    pub(super) collisions: usize,
+    /// How many it nearly missed on its way in or out.
+    pub(super) near_misses: usize,
+    /// How many ran into it, on the circle or out of it, who would have had to give way.
+    pub(super) run_into: usize,
+}
+
+impl Judge {
+    pub(super) fn new(parameters: &RoundaboutParameters) -> Self {
+        Self {
+            own_length_m: parameters.own_length_m,
+            own_front_m: parameters.own_front_m,
+            revolutions: vec![],
+            entered_s: None,
+        }
+    }
+
+    pub(super) fn take(&mut self, truth: &Truth, driver: &Driver) {
+        let time_s = truth.time.seconds();
+        let begin_s = self
+            .revolutions
+            .first()
+            .map_or(time_s, |first| first.time_s);
+        if driver.is_on_circle() {
+            self.entered_s.get_or_insert(time_s - begin_s);
+        }
+        let [x, y, _] = truth.sensor_m;
+        let ahead_m = self.own_front_m - self.own_length_m / 2.0;
+        let (sine, cosine) = libm::sincos(truth.sensor_yaw_rad);
+        let others = truth.objects.iter().map(|user| Footprint {
+            centre_m: user.centre_m,
+            yaw_rad: user.yaw_rad,
+            half_m: [user.size_m[0] / 2.0, user.size_m[1] / 2.0],
+        });
+        self.revolutions.push(Revolution {
+            time_s,
+            part: driver.part(),
+            own: Footprint {
+                centre_m: [x + ahead_m * cosine, y + ahead_m * sine],
+                yaw_rad: truth.sensor_yaw_rad,
+                half_m: [self.own_length_m / 2.0, WIDTH_M / 2.0],
+            },
+            others: others.collect(),
+        });
+    }
+
+    pub(super) fn outcome(&self) -> Outcome {
+        let count = self
+            .revolutions
+            .first()
+            .map_or(0, |first| first.others.len());
+        let mut outcome = Outcome {
+            entered_s: self.entered_s,
+            collisions: 0,
+            near_misses: 0,
+            run_into: 0,
+        };
+        for other in 0..count {
+            match self.encounter(other) {
+                Some(Encounter::Collision) => outcome.collisions += 1,
+                Some(Encounter::RunInto) => outcome.run_into += 1,
+                Some(Encounter::NearMiss) => outcome.near_misses += 1,
+                None => {}
+            }
+        }
+        outcome
+    }
+
+    /// The first encounter with one of the others that is one.
+    fn encounter(&self, other: usize) -> Option<Encounter> {
+        self.revolutions
+            .iter()
+            .enumerate()
+            .find_map(|(index, now)| {
+                let near = self.revolutions[index..]
+                    .iter()
+                    .take_while(|later| later.time_s - now.time_s < NEAR_MISS_S);
+                let mut near = near.map(|later| &later.others[other]);
+                let first = near.next()?;
+                if now.own.overlaps(first) {
+                    let is_run_into = match now.part {
+                        Part::Entry => false,
+                        // Who comes into the circle, or comes up from behind, would have had to give way.
+                        Part::Circle => !now.own.runs_into(first),
+                        Part::Exit => now.own.is_run_into_by(first),
+                    };
+                    return Some(match is_run_into {
+                        true => Encounter::RunInto,
+                        false => Encounter::Collision,
+                    });
+                }
+                let is_missed = match now.part {
+                    Part::Circle => false,
+                    Part::Entry => near.any(|there| now.own.overlaps(there)),
+                    // Who follows it out comes later than who crosses.
+                    Part::Exit => {
+                        near.any(|there| now.own.overlaps(there) && !now.own.goes_along_with(there))
+                    }
+                };
+                is_missed.then_some(Encounter::NearMiss)
+            })
+    }
+}
+
+enum Encounter {
+    Collision,
+    NearMiss,
+    RunInto,
+}
+
+impl Footprint {
+    /// Whether two rectangles have a place in common: no side of either parts them.
+    fn overlaps(&self, other: &Self) -> bool {
+        let apart_m = [0, 1].map(|axis| other.centre_m[axis] - self.centre_m[axis]);
+        [self, other].iter().all(|one| {
+            [0.0, std::f64::consts::FRAC_PI_2].iter().all(|turn_rad| {
+                let (sine, cosine) = libm::sincos(one.yaw_rad + turn_rad);
+                let along_m = (apart_m[0] * cosine + apart_m[1] * sine).abs();
+                along_m < self.reach_m([cosine, sine]) + other.reach_m([cosine, sine])
+            })
+        })
+    }
+
+    /// How far it reaches from its middle in a direction.
+    fn reach_m(&self, [x, y]: [f64; 2]) -> f64 {
+        let (sine, cosine) = libm::sincos(self.yaw_rad);
+        let [length_m, width_m] = self.half_m;
+        length_m * (x * cosine + y * sine).abs() + width_m * (y * cosine - x * sine).abs()
+    }
+
+    fn goes_along_with(&self, other: &Self) -> bool {
+        wrapped_rad(other.yaw_rad - self.yaw_rad).abs() < SAME_WAY_RAD
+    }
+
+    /// Whether another one comes from behind, the same way.
+    fn is_run_into_by(&self, other: &Self) -> bool {
+        self.goes_along_with(other) && self.is_behind(other)
+    }
+
+    /// Whether it comes from behind another one, the same way.
+    fn runs_into(&self, other: &Self) -> bool {
+        self.goes_along_with(other) && !self.is_behind(other)
+    }
+
+    /// Whether another one is behind it.
+    fn is_behind(&self, other: &Self) -> bool {
+        let (sine, cosine) = libm::sincos(self.yaw_rad);
+        let [x, y] = [0, 1].map(|axis| other.centre_m[axis] - self.centre_m[axis]);
+        x * cosine + y * sine < 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn footprint(x: f64, y: f64, yaw_rad: f64) -> Footprint {
+        Footprint {
+            centre_m: [x, y],
+            yaw_rad,
+            half_m: [2.0, 1.0],
+        }
+    }
+
+    #[test]
+    fn rectangles_overlap_where_no_side_parts_them() {
+        let own = footprint(0.0, 0.0, 0.0);
+        assert!(own.overlaps(&footprint(3.9, 0.0, 0.0)));
+        assert!(!own.overlaps(&footprint(4.1, 0.0, 0.0)));
+        assert!(!own.overlaps(&footprint(0.0, 3.1, std::f64::consts::FRAC_PI_2)));
+        assert!(own.overlaps(&footprint(0.0, 2.9, std::f64::consts::FRAC_PI_2)));
+        // Corner to corner.
+        assert!(own.overlaps(&footprint(2.9, 1.9, 0.78)));
+        assert!(!own.overlaps(&footprint(3.6, 2.6, 0.78)));
+    }
+
+    #[test]
+    fn who_comes_from_behind_runs_into_it_and_who_comes_across_does_not() {
+        let own = footprint(0.0, 0.0, 0.0);
+        assert!(own.is_run_into_by(&footprint(-3.0, 0.5, 0.2)));
+        assert!(!own.is_run_into_by(&footprint(3.0, 0.5, 0.2)));
+        assert!(!own.is_run_into_by(&footprint(-3.0, 0.5, 1.5)));
+        assert!(own.runs_into(&footprint(3.0, 0.5, 0.2)));
+        assert!(!own.runs_into(&footprint(3.0, 0.5, 0.8)));
+    }
+}

@@ -1,0 +1,333 @@
+//! Roundabouts that no map knows, by the ways of those who drive round them.
+
+use std::f64::consts::PI;
+
+use super::arms::{access, arms};
+use super::circle::Circle;
+use super::polyline::distance_m;
+use super::rings::{
+    Bend, Group, LEAST_COVERED, OFF_CIRCLE_M, SAME_CENTRE_M, bends, covered_share, grouped,
+};
+use super::roundabout::{Access, Ring, Roundabout, Source};
+use super::{LaneId, LaneKind, Polyline};
+use crate::ego::wrapped_rad;
+
+/// A way that somebody went.
+#[derive(Debug, Clone)]
+pub struct DrivenWay {
+    kind: LaneKind,
+    way: Polyline,
+    bends: Vec<Bend>,
+}
+
+/// A roundabout that was found so.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DrivenRoundabout {
+    /// Its circles, and arms where somebody came in or left.
+    pub roundabout: Roundabout,
+    /// How much speaks for it, below 1: the share of the way round that was driven, and how often. It is no calibrated
+    /// probability.
+    pub confidence: f64,
+}
+
+/// Less than this, all together, leads round no circle.
+const LEAST_SWEPT_RAD: f64 = 1.5 * PI;
+/// Turns of less than this are no part of a circle.
+const LEAST_TURN_RAD: f64 = PI / 4.0;
+/// Directions of a way are told from points so many apart: measured places scatter.
+const APART: usize = 4;
+/// So much of it is looked at before and behind its turns.
+const AROUND: usize = 6;
+
+impl DrivenWay {
+    /// Through places a metre or so apart.
+    pub fn new(kind: LaneKind, points_m: &[[f64; 2]]) -> Self {
+        let turns = turning(points_m).map_or(&[][..], |[from, to]| &points_m[from..to]);
+        let turns = Polyline::through(turns.iter().copied());
+        Self {
+            kind,
+            way: Polyline::through(points_m.iter().copied()),
+            bends: bends(0, &turns, OFF_CIRCLE_M),
+        }
+    }
+
+    /// Whether it may have led round a circle.
+    pub fn turns(&self) -> bool {
+        !self.bends.is_empty()
+    }
+}
+
+/// The part of a way in which it turns by as much as a piece of a circle does.
+fn turning(points_m: &[[f64; 2]]) -> Option<[usize; 2]> {
+    /// A radian in 60 m.
+    const STEP_RAD: f64 = APART as f64 / 60.0;
+    let heading_rad = |index: usize| {
+        let [from_m, to_m] = [points_m[index], points_m[index + APART]];
+        libm::atan2(to_m[1] - from_m[1], to_m[0] - from_m[0])
+    };
+    let count = points_m.len().checked_sub(2 * APART)?;
+    let steps =
+        (0..count).map(|index| wrapped_rad(heading_rad(index + APART) - heading_rad(index)));
+    let is_turn = |step_rad: &f64| step_rad.abs() > STEP_RAD;
+    let steps: Vec<f64> = steps.collect();
+    let first = steps.iter().position(is_turn)?;
+    let last = steps.iter().rposition(is_turn)?;
+    let turned_rad: f64 = steps.iter().map(|step_rad| step_rad.abs()).sum();
+    let to = (last + 2 * APART + AROUND).min(points_m.len());
+    (turned_rad / APART as f64 >= LEAST_TURN_RAD).then_some([first.saturating_sub(AROUND), to])
+}
+
+/// Roundabouts that ways lead round.
+pub fn driven_roundabouts(ways: &[DrivenWay]) -> Vec<DrivenRoundabout> {
+    let bends = ways.iter().enumerate().flat_map(|(lane, way)| {
+        way.bends.iter().cloned().map(move |mut bend| {
+            bend.lane = lane;
+            bend
+        })
+    });
+    let mut bends: Vec<Bend> = bends.collect();
+    bends.sort_by(|a, b| b.sweep_rad.abs().total_cmp(&a.sweep_rad.abs()));
+    let groups = grouped(|lane| ways[lane].kind, bends);
+    let mut found: Vec<DrivenRoundabout> = vec![];
+    for group in groups.iter().filter(|group| is_road(ways, group)) {
+        let centre_m = group.circle.centre_m;
+        let is_known = |known: &DrivenRoundabout| {
+            distance_m(known.roundabout.centre_m(), centre_m) < known.roundabout.outer_m()
+        };
+        if !found.iter().any(is_known) {
+            found.extend(around(ways, &groups, group));
+        }
+    }
+    found
+}
+
+/// Whether cars drove on it, not only round a corner.
+fn is_road(ways: &[DrivenWay], group: &Group) -> bool {
+    kind(ways, group) == LaneKind::Road && group.swept_rad() >= PI
+}
+
+fn kind(ways: &[DrivenWay], group: &Group) -> LaneKind {
+    ways[group.bends[0].lane].kind
+}
+
+/// All that leads around the middle of a group, if it leads round: cyclists and people on foot, who go round outside of the
+/// cars, say so, too.
+fn around(ways: &[DrivenWay], groups: &[Group], first: &Group) -> Option<DrivenRoundabout> {
+    let is_clockwise = first.bends[0].sweep_rad < 0.0;
+    let belongs = |group: &&Group| {
+        let is_near = distance_m(group.circle.centre_m, first.circle.centre_m) < SAME_CENTRE_M;
+        let is_same_way = (group.bends[0].sweep_rad < 0.0) == is_clockwise;
+        let is_inside = group.circle.radius_m < first.circle.radius_m;
+        is_near
+            && match kind(ways, group) {
+                LaneKind::Road => is_same_way && is_road(ways, group),
+                // Few go there, and not far in the time that one watches.
+                LaneKind::Bikeway | LaneKind::Pavement => {
+                    !is_inside && group.swept_rad() >= PI / 2.0
+                }
+            }
+    };
+    let members: Vec<&Group> = groups.iter().filter(belongs).collect();
+    let centre_m = common_centre_m(&members, first.circle.centre_m);
+    let circle = Circle {
+        centre_m,
+        ..first.circle
+    };
+    let runs: Vec<_> = members.iter().flat_map(|group| group.runs()).collect();
+    let covered_share = covered_share(&circle, &runs);
+    let swept_rad: f64 = members.iter().map(|group| group.swept_rad()).sum();
+    if covered_share < LEAST_COVERED || swept_rad < LEAST_SWEPT_RAD {
+        return None;
+    }
+    let roads: Vec<&Group> = members
+        .iter()
+        .copied()
+        .filter(|group| kind(ways, group) == LaneKind::Road)
+        .collect();
+    let mut rings: Vec<Ring> = members
+        .iter()
+        .map(|group| Ring {
+            circle: Circle {
+                centre_m,
+                radius_m: mean_radius_m(group, centre_m),
+            },
+            width_m: 0.0,
+            kind: kind(ways, group),
+            is_marked: false,
+        })
+        .collect();
+    rings.sort_by(|a, b| a.circle.radius_m.total_cmp(&b.circle.radius_m));
+    set_widths(&mut rings);
+    let off_m = |at_m: &[f64; 2]| circle.off_m(*at_m).abs();
+    let mut roundabout = Roundabout {
+        name: String::new(),
+        source: Source::Driven,
+        rings,
+        is_clockwise,
+        arms: vec![],
+        off_circle_m: first.runs().iter().flatten().map(off_m).fold(0.0, f64::max),
+        covered_share,
+    };
+    let (entries, exits) = accesses(ways, &roundabout, &roads);
+    roundabout.arms = arms(entries, exits, is_clockwise);
+    Some(DrivenRoundabout {
+        roundabout,
+        // Each half turn halves what speaks against it.
+        confidence: covered_share * (1.0 - libm::pow(0.5, swept_rad / PI)),
+    })
+}
+
+/// The middle of circles around one place: least squares of the distances from each of them, by Gauss and Newton.
+fn common_centre_m(groups: &[&Group], begin_m: [f64; 2]) -> [f64; 2] {
+    const ROUNDS: usize = 4;
+    let mut centre_m = begin_m;
+    for _ in 0..ROUNDS {
+        let mut normal = nalgebra::Matrix2::zeros();
+        let mut right = nalgebra::Vector2::zeros();
+        for group in groups {
+            // Without what all of its points have in common, which is its radius.
+            let rows: Vec<_> = group
+                .runs()
+                .concat()
+                .iter()
+                .map(|at_m| {
+                    let [x, y] = [at_m[0] - centre_m[0], at_m[1] - centre_m[1]];
+                    let away_m = libm::hypot(x, y).max(1e-6);
+                    (nalgebra::Vector2::new(x / away_m, y / away_m), away_m)
+                })
+                .collect();
+            let count = rows.len().max(1) as f64;
+            let mean = rows
+                .iter()
+                .map(|(row, _)| row)
+                .sum::<nalgebra::Vector2<f64>>()
+                / count;
+            let mean_m = rows.iter().map(|(_, away_m)| away_m).sum::<f64>() / count;
+            for (row, away_m) in rows {
+                let row = row - mean;
+                normal += row * row.transpose();
+                right += row * (away_m - mean_m);
+            }
+        }
+        let Some(step) = normal.lu().solve(&right) else {
+            break;
+        };
+        centre_m = [centre_m[0] + step[0], centre_m[1] + step[1]];
+    }
+    if distance_m(centre_m, begin_m) < SAME_CENTRE_M {
+        centre_m
+    } else {
+        begin_m
+    }
+}
+
+fn mean_radius_m(group: &Group, centre_m: [f64; 2]) -> f64 {
+    let points_m = group.runs().concat();
+    points_m
+        .iter()
+        .map(|&at_m| distance_m(at_m, centre_m))
+        .sum::<f64>()
+        / points_m.len().max(1) as f64
+}
+
+/// Nobody sees a lane's edges by who drives in its middle: lanes beside each other meet half way, and a single one is as
+/// wide as is built.
+fn set_widths(rings: &mut [Ring]) {
+    let roads = rings.iter().filter(|ring| ring.kind == LaneKind::Road);
+    let radii_m: Vec<f64> = roads.map(|ring| ring.circle.radius_m).collect();
+    for ring in rings {
+        let radius_m = ring.circle.radius_m;
+        let apart_m = radii_m.iter().map(|other_m| (other_m - radius_m).abs());
+        let nearest_m = apart_m
+            .filter(|apart_m| *apart_m > 0.0)
+            .fold(f64::INFINITY, f64::min);
+        ring.width_m = match ring.kind {
+            LaneKind::Road if nearest_m.is_finite() => nearest_m,
+            LaneKind::Road => built_width_m(radius_m),
+            kind => kind.usual_width_m(),
+        };
+    }
+}
+
+/// Width of a circular path of one lane by the radius of its middle. A mini roundabout's is 4 to 6 m wide; a small one's
+/// 9 m where its outer diameter is 26 m, 8 at 30, 7 at 35, 6.5 from 40 m on (FGSV 2006, "Merkblatt fuer die Anlage von
+/// Kreisverkehren").
+fn built_width_m(radius_m: f64) -> f64 {
+    /// Outer diameter and width.
+    const BUILT_M: [[f64; 2]; 6] = [
+        [13.0, 4.0],
+        [22.0, 6.0],
+        [26.0, 9.0],
+        [30.0, 8.0],
+        [35.0, 7.0],
+        [40.0, 6.5],
+    ];
+    let middle_m = |[diameter_m, width_m]: [f64; 2]| (diameter_m - width_m) / 2.0;
+    let mut pairs = BUILT_M.windows(2);
+    let between =
+        pairs.rfind(|pair| middle_m(pair[0]) <= radius_m && radius_m <= middle_m(pair[1]));
+    match between {
+        Some(pair) => {
+            let [low_m, high_m] = [middle_m(pair[0]), middle_m(pair[1])];
+            let share = (radius_m - low_m) / (high_m - low_m).max(1e-9);
+            pair[0][1] + share * (pair[1][1] - pair[0][1])
+        }
+        None if radius_m < middle_m(BUILT_M[0]) => BUILT_M[0][1],
+        None => BUILT_M[BUILT_M.len() - 1][1],
+    }
+}
+
+/// Where somebody came into the circle, and where somebody left it: of ways at one place the longest.
+fn accesses(
+    ways: &[DrivenWay],
+    roundabout: &Roundabout,
+    roads: &[&Group],
+) -> (Vec<Access>, Vec<Access>) {
+    /// A shorter way does not say where it comes from.
+    const LEAST_M: f64 = 8.0;
+    const SAME_MOUTH_RAD: f64 = 0.35;
+    let Some(outermost) = roundabout.roads().last() else {
+        return (vec![], vec![]);
+    };
+    let (mut entries, mut exits): (Vec<Access>, Vec<Access>) = (vec![], vec![]);
+    let mut lanes: Vec<usize> = roads
+        .iter()
+        .flat_map(|group| group.bends.iter().map(|bend| bend.lane))
+        .collect();
+    lanes.sort_unstable();
+    lanes.dedup();
+    for lane in lanes {
+        let DrivenWay { way, kind, .. } = &ways[lane];
+        let points_m = way.points_m();
+        let is_on = |at_m: &[f64; 2]| outermost.circle.off_m(*at_m) < OFF_CIRCLE_M;
+        let (Some(first), Some(last)) = (
+            points_m.iter().position(is_on),
+            points_m.iter().rposition(is_on),
+        ) else {
+            continue;
+        };
+        let pieces = [(&points_m[..=first], true), (&points_m[last..], false)];
+        for (piece, is_entry) in pieces {
+            let piece = Polyline::through(piece.iter().copied());
+            if piece.length_m() < LEAST_M {
+                continue;
+            }
+            let id = LaneId {
+                layer: 0,
+                road: lane as u32,
+                lane: 1,
+            };
+            let found = access(id, kind.usual_width_m(), *kind, piece, roundabout, is_entry);
+            let home = if is_entry { &mut entries } else { &mut exits };
+            let known = home.iter_mut().find(|known| {
+                wrapped_rad(known.mouth_rad - found.mouth_rad).abs() < SAME_MOUTH_RAD
+            });
+            match known {
+                Some(known) if known.way.length_m() < found.way.length_m() => *known = found,
+                Some(_) => {}
+                None => home.push(found),
+            }
+        }
+    }
+    (entries, exits)
+}

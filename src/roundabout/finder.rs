@@ -1,0 +1,208 @@
+//! Who drove where, for roundabouts that no map knows.
+
+use super::Situation;
+use super::lanes::course;
+use crate::ego::geodesy::Geodetic;
+use crate::roadmap::{
+    DrivenRoundabout, DrivenWay, LaneKind, Roundabout, driven_roundabouts, simplified,
+};
+use crate::track::{Class, Object};
+
+/// Slower road users tell no way.
+const MOVING_MPS: f64 = 0.8;
+/// Places of a way are so far apart.
+const APART_M: f64 = 1.0;
+/// Farther than this nobody goes between two revolutions: it is another way, or another frame.
+const LEAP_M: f64 = 8.0;
+/// A way is looked at anew when it has grown by so many places.
+const GROWN: usize = 15;
+/// No way longer than this is kept: its older half goes.
+const LONGEST: usize = 240;
+/// Ways that are kept: at first those go that turn nowhere, then the oldest.
+const MOST_WAYS: usize = 48;
+/// What is found with less confidence is not told.
+const LEAST_CONFIDENCE: f64 = 0.6;
+
+/// Ways of road users and of the vehicle itself, and what they lead round.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Finder {
+    trails: Vec<Trail>,
+    reference: Option<Geodetic>,
+    found: Vec<DrivenRoundabout>,
+}
+
+#[derive(Debug, Clone)]
+struct Trail {
+    /// Whose, as long as he is listed.
+    who: Option<Who>,
+    points_m: Vec<[f64; 2]>,
+    /// Places at which he was taken for what uses a kind of way.
+    kinds: [usize; 3],
+    /// Places that it had when it was looked at.
+    looked_at: usize,
+    way: Option<DrivenWay>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Who {
+    Vehicle,
+    Object(u32),
+}
+
+impl Finder {
+    /// What was found, in the local frame.
+    pub(super) fn found(&self) -> &[DrivenRoundabout] {
+        &self.found
+    }
+
+    /// Takes in where everybody is. Gives whether something else is found than before.
+    pub(super) fn take(&mut self, situation: &Situation<'_>) -> bool {
+        let was_found = !self.found.is_empty();
+        if self.reference != situation.reference {
+            self.reference = situation.reference;
+            self.trails.clear();
+            self.found.clear();
+        }
+        let is_listed = |who: &Who| match who {
+            Who::Vehicle => situation.vehicle.is_some(),
+            Who::Object(id) => situation.objects.iter().any(|object| object.id == *id),
+        };
+        for trail in &mut self.trails {
+            trail.who = trail.who.filter(is_listed);
+        }
+        if let Some(pose) = situation.vehicle {
+            let [x, y, _] = pose.position_m;
+            self.extend(Who::Vehicle, [x, y], LaneKind::Road);
+        }
+        for object in situation.objects.iter().filter(|object| object.measured) {
+            let (_, speed_mps) = course(object);
+            if let Some(kind) = kind_of(object).filter(|_| speed_mps > MOVING_MPS) {
+                let [x, y, _] = object.centre_m;
+                self.extend(Who::Object(object.id), [x, y], kind);
+            }
+        }
+        self.thin_out();
+        let changed = self.look() && self.conclude();
+        changed || (was_found && self.found.is_empty())
+    }
+
+    fn extend(&mut self, who: Who, at_m: [f64; 2], kind: LaneKind) {
+        let own = self.trails.iter_mut().find(|trail| trail.who == Some(who));
+        if let Some(trail) = own {
+            let last_m = trail.points_m.last().copied().unwrap_or(at_m);
+            let gone_m = libm::hypot(at_m[0] - last_m[0], at_m[1] - last_m[1]);
+            if gone_m < APART_M {
+                return;
+            }
+            if gone_m < LEAP_M {
+                trail.push(at_m, kind);
+                return;
+            }
+            trail.who = None;
+        }
+        let mut trail = Trail {
+            who: Some(who),
+            points_m: vec![],
+            kinds: [0; 3],
+            looked_at: 0,
+            way: None,
+        };
+        trail.push(at_m, kind);
+        self.trails.push(trail);
+    }
+
+    /// Forgets ways that are over and tell nothing, and of too many the oldest.
+    fn thin_out(&mut self) {
+        self.trails
+            .retain(|trail| trail.who.is_some() || !trail.is_looked_at() || trail.way.is_some());
+        while self.trails.len() > MOST_WAYS {
+            let straight = self.trails.iter().position(|trail| trail.way.is_none());
+            self.trails.remove(straight.unwrap_or(0));
+        }
+    }
+
+    /// Looks at one of the ways that have grown or are over. Gives whether it leads round something.
+    fn look(&mut self) -> bool {
+        let grown = self.trails.iter_mut().find(|trail| !trail.is_looked_at());
+        grown.is_some_and(Trail::look)
+    }
+
+    /// Gives whether that is something else than before.
+    fn conclude(&mut self) -> bool {
+        let ways = self.trails.iter().filter_map(|trail| trail.way.clone());
+        let ways: Vec<DrivenWay> = ways.collect();
+        let mut found = driven_roundabouts(&ways);
+        found.retain(|one| one.confidence >= LEAST_CONFIDENCE);
+        for one in &mut found {
+            one.roundabout = simplified(&one.roundabout).roundabout;
+        }
+        let is_same = self.found.len() == found.len()
+            && self.found.iter().zip(&found).all(|(a, b)| is_same(a, b));
+        if is_same {
+            // Places do not tremble; how much speaks for it may grow.
+            for (known, new) in self.found.iter_mut().zip(&found) {
+                known.confidence = new.confidence;
+            }
+            return false;
+        }
+        self.found = found;
+        true
+    }
+}
+
+impl Trail {
+    fn push(&mut self, at_m: [f64; 2], kind: LaneKind) {
+        if self.points_m.len() >= LONGEST {
+            self.points_m.drain(..LONGEST / 2);
+            self.looked_at = self.looked_at.saturating_sub(LONGEST / 2);
+        }
+        self.points_m.push(at_m);
+        self.kinds[kind.number() as usize] += 1;
+    }
+
+    /// Whether nothing has come since that would change it.
+    fn is_looked_at(&self) -> bool {
+        let grown = self.points_m.len() - self.looked_at;
+        grown < if self.who.is_some() { GROWN } else { 1 }
+    }
+
+    fn look(&mut self) -> bool {
+        self.looked_at = self.points_m.len();
+        let kinds = LaneKind::ALL.into_iter();
+        let kind = kinds.max_by_key(|kind| self.kinds[kind.number() as usize]);
+        let way = DrivenWay::new(kind.unwrap_or_default(), &self.points_m);
+        self.way = way.turns().then_some(way);
+        self.way.is_some()
+    }
+}
+
+/// Whether the same circles and arms were found, at the same place.
+fn is_same(a: &DrivenRoundabout, b: &DrivenRoundabout) -> bool {
+    const MOVED_M: f64 = 0.1;
+    let (a, b) = (&a.roundabout, &b.roundabout);
+    let ways = |one: &Roundabout| -> Vec<[usize; 2]> {
+        let arms = one.arms.iter();
+        arms.map(|arm| [arm.entries.len(), arm.exits.len()])
+            .collect()
+    };
+    let rings = || a.rings.iter().zip(&b.rings);
+    let is_near = |a: f64, b: f64| (a - b).abs() < MOVED_M;
+    a.rings.len() == b.rings.len()
+        && rings().all(|(a, b)| {
+            a.kind == b.kind
+                && is_near(a.circle.radius_m, b.circle.radius_m)
+                && is_near(a.circle.centre_m[0], b.circle.centre_m[0])
+                && is_near(a.circle.centre_m[1], b.circle.centre_m[1])
+        })
+        && ways(a) == ways(b)
+}
+
+/// The kind of way that a road user uses.
+fn kind_of(object: &Object) -> Option<LaneKind> {
+    match object.class {
+        Class::Car | Class::LargeVehicle => Some(LaneKind::Road),
+        Class::Cyclist => Some(LaneKind::Bikeway),
+        Class::Pedestrian => Some(LaneKind::Pavement),
+        Class::Unclassified => None,
+    }
+}
