@@ -89,7 +89,8 @@ pub fn driven_roundabouts(ways: &[DrivenWay]) -> Vec<DrivenRoundabout> {
     bends.sort_by(|a, b| b.sweep_rad.abs().total_cmp(&a.sweep_rad.abs()));
     let groups = grouped(|lane| ways[lane].kind, bends);
     let mut found: Vec<DrivenRoundabout> = vec![];
-    for group in groups.iter().filter(|group| is_road(ways, group)) {
+    // How little cars went round may be, where others went round more.
+    for group in groups.iter().filter(|group| is_road(ways, group, PI / 2.0)) {
         let centre_m = group.circle.centre_m;
         let is_known = |known: &DrivenRoundabout| {
             distance_m(known.roundabout.centre_m(), centre_m) < known.roundabout.outer_m()
@@ -101,9 +102,9 @@ pub fn driven_roundabouts(ways: &[DrivenWay]) -> Vec<DrivenRoundabout> {
     found
 }
 
-/// Whether cars drove on it, not only round a corner.
-fn is_road(ways: &[DrivenWay], group: &Group) -> bool {
-    kind(ways, group) == LaneKind::Road && group.swept_rad() >= PI
+/// Whether cars drove on it, so far round all together.
+fn is_road(ways: &[DrivenWay], group: &Group, least_rad: f64) -> bool {
+    kind(ways, group) == LaneKind::Road && group.swept_rad() >= least_rad
 }
 
 fn kind(ways: &[DrivenWay], group: &Group) -> LaneKind {
@@ -120,7 +121,9 @@ fn around(ways: &[DrivenWay], groups: &[Group], first: &Group) -> Option<DrivenR
         let is_inside = group.circle.radius_m < first.circle.radius_m;
         is_near
             && match kind(ways, group) {
-                LaneKind::Road => is_same_way && is_road(ways, group),
+                LaneKind::Road => {
+                    std::ptr::eq(*group, first) || (is_same_way && is_road(ways, group, PI))
+                }
                 // Few go there, and not far in the time that one watches.
                 LaneKind::Bikeway | LaneKind::Pavement => {
                     !is_inside && group.swept_rad() >= PI / 2.0

@@ -7,6 +7,9 @@ use crate::roadmap::{
 use crate::simulate::fixes::REFERENCE;
 use crate::simulate::path::Path;
 
+/// On this way a driver turns the front wheels from one bend to the other: at 5 m/s by some 40 degrees in a second.
+pub(super) const STEERING_M: f64 = 5.0;
+
 /// A way through a roundabout: straight on in the right lane, a bend to the right that touches
 /// the circle, round to the exit, out.
 #[derive(Clone, Copy)]

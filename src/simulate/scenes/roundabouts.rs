@@ -1,6 +1,6 @@
 //! Roundabouts, large and small.
 
-use super::passage::{Circle, Passage, roads};
+use super::passage::{Circle, Passage, STEERING_M, roads};
 use super::{LANE_M, RANGE_DEVIATION_M, SENSOR_M, about, actor};
 use crate::random::Random;
 use crate::roadmap::Roadmap;
@@ -35,8 +35,6 @@ pub(super) fn waiting_roads() -> Roadmap {
     roads("roundabout-waiting", &[shifted], &SMALL_CIRCLES)
 }
 
-/// On this way a driver turns the front wheels from one bend to the other: at 5 m/s by some 40 degrees in a second.
-const STEERING_M: f64 = 5.0;
 /// How far the waiting sensor's scene is moved so that the sensor is the origin of a frame without poses.
 const BACK_M: [f64; 2] = [0.0, -21.0];
 

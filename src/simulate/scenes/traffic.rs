@@ -1,6 +1,6 @@
 //! Roundabouts that cars pass in every way, before a vehicle that waits to enter.
 
-use super::passage::{Circle, HEADINGS_DEG, Passage, roads};
+use super::passage::{Circle, HEADINGS_DEG, Passage, STEERING_M, roads};
 use super::roundabouts::SMALL_CIRCLES;
 use super::{LANE_M, RANGE_DEVIATION_M, SENSOR_M, about, actor};
 use crate::random::Random;
@@ -88,11 +88,14 @@ fn entering(scene: Scene, passage: &Passage, random: &mut Random) -> Scene {
     let approach_m = WAY_M - bend_m;
     let even_s = (WAY_M - APPROACH_MPS * BRAKES_S / 2.0) / APPROACH_MPS;
     Scene {
-        ego: passage.path(EGO_DEG, approach_m, exit).timed(&[
-            (0.0, APPROACH_MPS),
-            (even_s, APPROACH_MPS),
-            (even_s + BRAKES_S, 0.0),
-        ]),
+        ego: passage
+            .path(EGO_DEG, approach_m, exit)
+            .steered(STEERING_M)
+            .timed(&[
+                (0.0, APPROACH_MPS),
+                (even_s, APPROACH_MPS),
+                (even_s + BRAKES_S, 0.0),
+            ]),
         ..scene
     }
 }
@@ -167,7 +170,8 @@ fn passing(passage: &Passage, heading_deg: f64, exit: u32, comes_s: f64, round_m
     let slowing_m = SLOWS_S * (APPROACH_MPS + round_mps) / 2.0;
     let approach_m = APPROACH_MPS * comes_s + slowing_m;
     let leaves_s = comes_s + SLOWS_S + passage.inside_m(exit) / round_mps;
-    passage.path(heading_deg, approach_m, exit).timed(&[
+    let way = passage.path(heading_deg, approach_m, exit);
+    way.steered(STEERING_M).timed(&[
         (0.0, APPROACH_MPS),
         (comes_s, APPROACH_MPS),
         (comes_s + SLOWS_S, round_mps),
