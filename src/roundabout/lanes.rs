@@ -216,14 +216,24 @@ fn take_candidates(site: &Site, object: &Object, found: &mut Vec<Candidate>) {
     };
     found.push(Candidate::new(nowhere, ELSEWHERE));
     found.extend((0..site.rings.len()).filter_map(|ring| on_ring(site, ring, object)));
+    let outermost = site.outermost_road().map(|ring| &site.rings[ring].circle);
+    let side = if site.is_clockwise { -1.0 } else { 1.0 };
+    let round_per_m = outermost.map_or(0.0, |circle| side / circle.radius_m);
     for (arm, ways) in site.arms.iter().enumerate() {
         for (lane, entry) in ways.entries.iter().enumerate() {
             let place = Place::Entry(arm, lane);
-            found.extend(on_way(place, &entry.way, entry.width_m, object));
+            let before_per_m = 0.0;
+            found.extend(on_way(
+                place,
+                &entry.way,
+                entry.width_m,
+                before_per_m,
+                object,
+            ));
         }
         for (lane, exit) in ways.exits.iter().enumerate() {
             let place = Place::Exit(arm, lane);
-            found.extend(on_way(place, &exit.way, exit.width_m, object));
+            found.extend(on_way(place, &exit.way, exit.width_m, round_per_m, object));
         }
     }
 }
@@ -305,18 +315,23 @@ fn on_ring(site: &Site, index: usize, object: &Object) -> Option<Candidate> {
     Some(Candidate::new(on, likelihood))
 }
 
+/// `before_per_m` is the curvature of what leads to the way: nobody turns the wheel at once, and a turn rate is told late.
 fn on_way(
     place: Place,
     way: &crate::roadmap::Polyline,
     width_m: f64,
+    before_per_m: f64,
     object: &Object,
 ) -> Option<Candidate> {
+    const TURNS_M: f64 = 4.0;
     let station = way.nearest([object.centre_m[0], object.centre_m[1]])?;
     // Before the beginning or behind the end it is another lane's.
     if station.distance_m > 2.0 * width_m || station.distance_m > station.offset_m.abs() + 1.0 {
         return None;
     }
-    let curvature_per_m = curvature_per_m(way, station.along_m);
+    let turned = (station.along_m / TURNS_M).clamp(0.0, 1.0);
+    let curvature_per_m =
+        before_per_m + turned * (curvature_per_m(way, station.along_m) - before_per_m);
     let (course_rad, speed_mps) = course(object);
     let fit = motion_fit(object, station.heading_rad, curvature_per_m);
     let on = OnLane {
