@@ -40,20 +40,16 @@ const APART: usize = 4;
 const AROUND: usize = 6;
 
 impl DrivenWay {
-    /// Through places a metre or so apart.
-    pub fn new(kind: LaneKind, points_m: &[[f64; 2]]) -> Self {
-        let turns = turning(points_m).map_or(&[][..], |[from, to]| &points_m[from..to]);
-        let turns = Polyline::through(turns.iter().copied());
-        Self {
+    /// Through places a metre or so apart; nothing if it leads round no piece of a circle.
+    pub fn new(kind: LaneKind, points_m: &[[f64; 2]]) -> Option<Self> {
+        let [from, to] = turning(points_m)?;
+        let turns = Polyline::through(points_m[from..to].iter().copied());
+        let bends = bends(0, &turns, OFF_CIRCLE_M);
+        (!bends.is_empty()).then(|| Self {
             kind,
             way: Polyline::through(points_m.iter().copied()),
-            bends: bends(0, &turns, OFF_CIRCLE_M),
-        }
-    }
-
-    /// Whether it may have led round a circle.
-    pub fn turns(&self) -> bool {
-        !self.bends.is_empty()
+            bends,
+        })
     }
 }
 
@@ -66,13 +62,11 @@ fn turning(points_m: &[[f64; 2]]) -> Option<[usize; 2]> {
         libm::atan2(to_m[1] - from_m[1], to_m[0] - from_m[0])
     };
     let count = points_m.len().checked_sub(2 * APART)?;
-    let steps =
-        (0..count).map(|index| wrapped_rad(heading_rad(index + APART) - heading_rad(index)));
-    let is_turn = |step_rad: &f64| step_rad.abs() > STEP_RAD;
-    let steps: Vec<f64> = steps.collect();
-    let first = steps.iter().position(is_turn)?;
-    let last = steps.iter().rposition(is_turn)?;
-    let turned_rad: f64 = steps.iter().map(|step_rad| step_rad.abs()).sum();
+    let step_rad = |index: usize| wrapped_rad(heading_rad(index + APART) - heading_rad(index));
+    let is_turn = |index: &usize| step_rad(*index).abs() > STEP_RAD;
+    let first = (0..count).find(is_turn)?;
+    let last = (first..count).rfind(is_turn)?;
+    let turned_rad: f64 = (first..=last).map(|index| step_rad(index).abs()).sum();
     let to = (last + 2 * APART + AROUND).min(points_m.len());
     (turned_rad / APART as f64 >= LEAST_TURN_RAD).then_some([first.saturating_sub(AROUND), to])
 }

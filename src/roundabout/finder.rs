@@ -26,21 +26,34 @@ const LEAST_CONFIDENCE: f64 = 0.6;
 /// Ways of road users and of the vehicle itself, and what they lead round.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Finder {
+    /// In places that are used again.
     trails: Vec<Trail>,
+    /// How many ways began.
+    begun: u64,
     reference: Option<Geodetic>,
     found: Vec<DrivenRoundabout>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Trail {
-    /// Whose, as long as he is listed.
-    who: Option<Who>,
+    use_of: Use,
+    /// Number of the way.
+    number: u64,
     points_m: Vec<[f64; 2]>,
     /// Places at which he was taken for what uses a kind of way.
     kinds: [usize; 3],
     /// Places that it had when it was looked at.
     looked_at: usize,
     way: Option<DrivenWay>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Use {
+    #[default]
+    Free,
+    /// Of somebody who is listed.
+    Going(Who),
+    Over,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,12 +76,14 @@ impl Finder {
             self.trails.clear();
             self.found.clear();
         }
-        let is_listed = |who: &Who| match who {
+        let is_listed = |who: Who| match who {
             Who::Vehicle => situation.vehicle.is_some(),
-            Who::Object(id) => situation.objects.iter().any(|object| object.id == *id),
+            Who::Object(id) => situation.objects.iter().any(|object| object.id == id),
         };
         for trail in &mut self.trails {
-            trail.who = trail.who.filter(is_listed);
+            if matches!(trail.use_of, Use::Going(who) if !is_listed(who)) {
+                trail.use_of = Use::Over;
+            }
         }
         if let Some(pose) = situation.vehicle {
             let [x, y, _] = pose.position_m;
@@ -81,14 +96,13 @@ impl Finder {
                 self.extend(Who::Object(object.id), [x, y], kind);
             }
         }
-        self.thin_out();
         let changed = self.look() && self.conclude();
         changed || (was_found && self.found.is_empty())
     }
 
     fn extend(&mut self, who: Who, at_m: [f64; 2], kind: LaneKind) {
-        let own = self.trails.iter_mut().find(|trail| trail.who == Some(who));
-        if let Some(trail) = own {
+        let mut trails = self.trails.iter_mut();
+        if let Some(trail) = trails.find(|trail| trail.use_of == Use::Going(who)) {
             let last_m = trail.points_m.last().copied().unwrap_or(at_m);
             let gone_m = libm::hypot(at_m[0] - last_m[0], at_m[1] - last_m[1]);
             if gone_m < APART_M {
@@ -98,27 +112,27 @@ impl Finder {
                 trail.push(at_m, kind);
                 return;
             }
-            trail.who = None;
+            trail.use_of = Use::Over;
         }
-        let mut trail = Trail {
-            who: Some(who),
-            points_m: vec![],
-            kinds: [0; 3],
-            looked_at: 0,
-            way: None,
-        };
-        trail.push(at_m, kind);
-        self.trails.push(trail);
+        self.begun += 1;
+        let number = self.begun;
+        if let Some(trail) = self.place() {
+            trail.begin(who, number);
+            trail.push(at_m, kind);
+        }
     }
 
-    /// Forgets ways that are over and tell nothing, and of too many the oldest.
-    fn thin_out(&mut self) {
-        self.trails
-            .retain(|trail| trail.who.is_some() || !trail.is_looked_at() || trail.way.is_some());
-        while self.trails.len() > MOST_WAYS {
-            let straight = self.trails.iter().position(|trail| trail.way.is_none());
-            self.trails.remove(straight.unwrap_or(0));
+    /// A place for another way: of too many those go first that turn nowhere, then the oldest.
+    fn place(&mut self) -> Option<&mut Trail> {
+        if self.trails.len() < MOST_WAYS {
+            self.trails.push(Trail::default());
+            return self.trails.last_mut();
         }
+        let over = self
+            .trails
+            .iter_mut()
+            .filter(|trail| !matches!(trail.use_of, Use::Going(_)));
+        over.min_by_key(|trail| (trail.use_of == Use::Over, trail.way.is_some(), trail.number))
     }
 
     /// Looks at one of the ways that have grown or are over. Gives whether it leads round something.
@@ -151,6 +165,16 @@ impl Finder {
 }
 
 impl Trail {
+    fn begin(&mut self, who: Who, number: u64) {
+        self.use_of = Use::Going(who);
+        self.number = number;
+        self.points_m.clear();
+        self.points_m.reserve(LONGEST);
+        self.kinds = [0; 3];
+        self.looked_at = 0;
+        self.way = None;
+    }
+
     fn push(&mut self, at_m: [f64; 2], kind: LaneKind) {
         if self.points_m.len() >= LONGEST {
             self.points_m.drain(..LONGEST / 2);
@@ -163,15 +187,21 @@ impl Trail {
     /// Whether nothing has come since that would change it.
     fn is_looked_at(&self) -> bool {
         let grown = self.points_m.len() - self.looked_at;
-        grown < if self.who.is_some() { GROWN } else { 1 }
+        match self.use_of {
+            Use::Free => true,
+            Use::Going(_) => grown < GROWN,
+            Use::Over => grown == 0,
+        }
     }
 
     fn look(&mut self) -> bool {
         self.looked_at = self.points_m.len();
         let kinds = LaneKind::ALL.into_iter();
         let kind = kinds.max_by_key(|kind| self.kinds[kind.number() as usize]);
-        let way = DrivenWay::new(kind.unwrap_or_default(), &self.points_m);
-        self.way = way.turns().then_some(way);
+        self.way = DrivenWay::new(kind.unwrap_or_default(), &self.points_m);
+        if self.way.is_none() && self.use_of == Use::Over {
+            self.use_of = Use::Free;
+        }
         self.way.is_some()
     }
 }

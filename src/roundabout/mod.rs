@@ -168,12 +168,11 @@ impl Watcher {
 
     /// Takes in a revolution.
     pub fn watch(&mut self, situation: &Situation<'_>) {
-        if self.parameters.find {
-            self.find(situation);
-        } else if self.roundabouts.is_empty() {
-            return;
-        }
         self.place(situation);
+        let is_mapped = |watched| watched < self.roundabouts.len();
+        if self.parameters.find && !self.watched.is_some_and(is_mapped) {
+            self.find(situation);
+        }
         let Some(index) = self.nearest(situation) else {
             self.forget();
             return;

@@ -14,8 +14,8 @@ const SIDEWAYS_MPS2: f64 = 5.0;
 const BRAKES_MPS2: f64 = 3.0;
 /// So near to where it has to stand it stands.
 const STANDS_M: f64 = 0.3;
-/// So far behind it, it goes on.
-const GOES_ON_M: f64 = 0.5;
+/// So far behind it, where others cross, it goes on.
+const GOES_ON_M: f64 = 1.0;
 /// How far it looks ahead.
 const AHEAD_M: usize = 25;
 /// Between two decisions.

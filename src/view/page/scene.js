@@ -96,15 +96,15 @@ function drawMap(context, camera, world) {
   context.restore();
 }
 
-// Lanes as rings; at each arm a bar of time, outward, a metre a second: green or red as one may enter, with the own window
+// Lanes as rings, fainter where no map knows them; at each arm a bar of time, outward, a metre a second: green or red as one may enter, with the own window
 // and everybody's beside it.
 function drawRoundabout(context, camera, { roundabout, groundZ }, colours) {
-  const { arms, windows, rings, diameter, ownArm } = roundabout;
+  const { arms, windows, rings, diameter, ownArm, confidence } = roundabout;
   context.save();
   camera.enterPlane(context, { x: roundabout.x, y: roundabout.y, yaw: 0 }, groundZ);
   context.strokeStyle = colours.path;
   for (const { kind, radius, width } of rings) {
-    context.globalAlpha = kind === 0 ? 0.22 : 0.1;
+    context.globalAlpha = (kind === 0 ? 0.22 : 0.1) * confidence;
     context.lineWidth = width;
     context.beginPath();
     context.arc(0, 0, radius, 0, 2 * Math.PI);

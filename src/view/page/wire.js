@@ -41,7 +41,7 @@ const WINDOW = {
 const RING = { 1: ["kind", u32], 2: ["radius", f32], 3: ["width", f32] };
 const ROUNDABOUT = {
   2: ["name", text], 3: ["x", f64], 4: ["y", f64], 5: ["diameter", f32], 6: ["state", u32], 7: ["ownArm", s32],
-  8: ["arms", bytes], 9: ["windows", bytes], 11: ["rings", bytes],
+  8: ["arms", bytes], 9: ["windows", bytes], 11: ["rings", bytes], 12: ["confidence", f32],
 };
 
 const KINDS = {
