@@ -6,7 +6,8 @@ use super::arms::{access, arms};
 use super::circle::Circle;
 use super::polyline::distance_m;
 use super::rings::{
-    Bend, Group, LEAST_COVERED, OFF_CIRCLE_M, SAME_CENTRE_M, bends, covered_share, grouped,
+    Bend, Group, LEAST_COVERED, OFF_CIRCLE_M, SAME_CENTRE_M, SAME_RADIUS_M, bends, covered_share,
+    grouped,
 };
 use super::roundabout::{Access, Ring, Roundabout, Source};
 use super::{LaneId, LaneKind, Polyline};
@@ -141,19 +142,7 @@ fn around(ways: &[DrivenWay], groups: &[Group], first: &Group) -> Option<DrivenR
         .copied()
         .filter(|group| kind(ways, group) == LaneKind::Road)
         .collect();
-    let mut rings: Vec<Ring> = members
-        .iter()
-        .map(|group| Ring {
-            circle: Circle {
-                centre_m,
-                radius_m: mean_radius_m(group, centre_m),
-            },
-            width_m: 0.0,
-            kind: kind(ways, group),
-            is_marked: false,
-        })
-        .collect();
-    rings.sort_by(|a, b| a.circle.radius_m.total_cmp(&b.circle.radius_m));
+    let mut rings = rings(ways, &members, centre_m);
     set_widths(&mut rings);
     let off_m = |at_m: &[f64; 2]| circle.off_m(*at_m).abs();
     let mut roundabout = Roundabout {
@@ -218,13 +207,39 @@ fn common_centre_m(groups: &[&Group], begin_m: [f64; 2]) -> [f64; 2] {
     }
 }
 
-fn mean_radius_m(group: &Group, centre_m: [f64; 2]) -> f64 {
-    let points_m = group.runs().concat();
-    points_m
+/// From the inside out. Groups that were fitted apart may turn out to be one around the common middle.
+fn rings(ways: &[DrivenWay], groups: &[&Group], centre_m: [f64; 2]) -> Vec<Ring> {
+    let mut radii: Vec<(LaneKind, f64, usize)> = groups
         .iter()
-        .map(|&at_m| distance_m(at_m, centre_m))
-        .sum::<f64>()
-        / points_m.len().max(1) as f64
+        .map(|group| {
+            let points_m = group.runs().concat();
+            let away_m = points_m.iter().map(|&at_m| distance_m(at_m, centre_m));
+            let count = points_m.len().max(1);
+            (kind(ways, group), away_m.sum::<f64>() / count as f64, count)
+        })
+        .collect();
+    radii.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let mut merged: Vec<(LaneKind, f64, usize)> = vec![];
+    for (kind, radius_m, count) in radii {
+        let same = merged.iter_mut().find(|(other, other_m, _)| {
+            *other == kind && (radius_m - *other_m).abs() < SAME_RADIUS_M
+        });
+        match same {
+            Some((_, mean_m, before)) => {
+                let all = (*before + count) as f64;
+                *mean_m = (*mean_m * *before as f64 + radius_m * count as f64) / all;
+                *before += count;
+            }
+            None => merged.push((kind, radius_m, count)),
+        }
+    }
+    let rings = merged.into_iter().map(|(kind, radius_m, _)| Ring {
+        circle: Circle { centre_m, radius_m },
+        width_m: 0.0,
+        kind,
+        is_marked: false,
+    });
+    rings.collect()
 }
 
 /// Nobody sees a lane's edges by who drives in its middle: lanes beside each other meet half way, and a single one is as
@@ -327,4 +342,63 @@ fn accesses(
         }
     }
     (entries, exits)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Along a circle around the origin, a metre from place to place.
+    fn round(kind: LaneKind, radius_m: f64, from_rad: f64, sweep_rad: f64) -> DrivenWay {
+        let steps = (radius_m * sweep_rad) as usize;
+        let points_m: Vec<[f64; 2]> = (0..=steps)
+            .map(|step| {
+                let angle_rad = from_rad + sweep_rad * step as f64 / steps as f64;
+                let (sine, cosine) = libm::sincos(angle_rad);
+                // As places that are measured scatter.
+                let off_m = 0.2 * libm::sin(7.0 * step as f64);
+                [(radius_m + off_m) * cosine, (radius_m + off_m) * sine]
+            })
+            .collect();
+        DrivenWay::new(kind, &points_m).unwrap()
+    }
+
+    #[test]
+    fn lanes_side_by_side_meet_half_way() {
+        let ways = [
+            round(LaneKind::Road, 15.0, 0.0, 4.0),
+            round(LaneKind::Road, 19.0, 2.0, 3.5),
+            round(LaneKind::Bikeway, 22.6, 1.0, 2.0),
+        ];
+        let found = driven_roundabouts(&ways);
+        assert_eq!(found.len(), 1);
+        let rings = &found[0].roundabout.rings;
+        for (ring, (kind, inner_m, outer_m)) in rings.iter().zip([
+            (LaneKind::Road, 13.0, 17.0),
+            (LaneKind::Road, 17.0, 21.0),
+            (LaneKind::Bikeway, 21.6, 23.6),
+        ]) {
+            assert_eq!(ring.kind, kind);
+            let off_m = [ring.inner_m() - inner_m, ring.outer_m() - outer_m];
+            assert!(off_m.iter().all(|off_m| off_m.abs() < 0.2), "{rings:?}");
+        }
+        assert_eq!(rings.len(), 3);
+        assert!(!found[0].roundabout.is_clockwise);
+    }
+
+    #[test]
+    fn one_who_turns_round_in_the_road_circles_nothing() {
+        let ways = [round(LaneKind::Road, 6.0, 0.0, PI)];
+        assert!(driven_roundabouts(&ways).is_empty());
+    }
+
+    #[test]
+    fn widths_are_as_built() {
+        for (radius_m, width_m) in [(3.0, 4.0), (8.0, 6.0), (8.5, 9.0), (11.0, 8.0), (30.0, 6.5)] {
+            assert!(
+                (built_width_m(radius_m) - width_m).abs() < 1e-9,
+                "{radius_m}"
+            );
+        }
+    }
 }

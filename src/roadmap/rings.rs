@@ -23,7 +23,7 @@ const LEAST_SWEEP_RAD: f64 = PI / 4.0;
 /// Pieces of one circle have their middles within this of each other.
 pub(super) const SAME_CENTRE_M: f64 = 3.0;
 /// And their radii, if they are one lane.
-const SAME_RADIUS_M: f64 = 2.0;
+pub(super) const SAME_RADIUS_M: f64 = 2.0;
 /// Less of the way round than this is a bend.
 pub(super) const LEAST_COVERED: f64 = 0.5;
 
