@@ -171,6 +171,7 @@ impl Pipeline {
         let situation = Situation {
             time,
             reference: sweep.reference,
+            epoch: sweep.epoch,
             vehicle: sweep.vehicle,
             vehicle_speed_mps: libm::hypot(x, y),
             objects: &self.objects,

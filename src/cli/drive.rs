@@ -110,6 +110,7 @@ impl Eyes {
                 watcher.watch(&Situation {
                     time: truth.time,
                     reference: Some(reference),
+                    epoch: 0,
                     vehicle: Some(Pose {
                         position_m: truth.sensor_m,
                         yaw_rad: truth.sensor_yaw_rad,

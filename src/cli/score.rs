@@ -172,6 +172,7 @@ impl Score {
             let situation = Situation {
                 time: report.time,
                 reference: pipeline.sweep().reference,
+                epoch: pipeline.sweep().epoch,
                 vehicle: Some(vehicle),
                 vehicle_speed_mps: line.ego.v,
                 objects: &users,

@@ -124,7 +124,7 @@ fn ring_of(ring: &Ring) -> RoundaboutRing {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::roundabout::OnLane;
+    use crate::roundabout::{Crossing, OnLane};
     use crate::wire::Message as _;
     use crate::wire::frame::MAX_DATAGRAM_LEN;
 
@@ -158,11 +158,36 @@ mod tests {
             object_id: 1,
             ..window
         };
+        let crossing = Crossing {
+            may_go: true,
+            hindrance: Some(Hindrance::RoadUser(u32::MAX)),
+            gap_s: 14.0,
+            own_window_s: [1.0, 2.0],
+            margin_s: 10.0,
+            stop_m: -1.0,
+            seen_share: 0.5,
+        };
+        let arm = ArmAdvice {
+            bearing_rad: 1.0,
+            entry: crossing.clone(),
+            exit: crossing,
+        };
+        let ring = Ring {
+            circle: crate::roadmap::Circle {
+                centre_m: [0.0; 2],
+                radius_m: 11.0,
+            },
+            width_m: 8.0,
+            kind: crate::roadmap::LaneKind::Pavement,
+            is_marked: false,
+        };
         let windows = (0..5000).map(|_| window).chain([soon]);
         let advice = Advice {
             name: "x".repeat(1000),
             windows: windows.collect(),
             users: vec![user; 1000],
+            arms: vec![arm; 1000],
+            rings: vec![ring; 1000],
             ..Advice::default()
         };
         /// Of an envelope.

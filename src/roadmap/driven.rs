@@ -144,6 +144,13 @@ fn around(ways: &[DrivenWay], groups: &[Group], first: &Group) -> Option<DrivenR
         .collect();
     let mut rings = rings(ways, &members, centre_m);
     set_widths(&mut rings);
+    // Cyclists on the road have no way of their own.
+    let outer_m = rings
+        .iter()
+        .filter(|ring| ring.kind == LaneKind::Road)
+        .map(Ring::outer_m)
+        .fold(0.0, f64::max);
+    rings.retain(|ring| ring.kind == LaneKind::Road || ring.circle.radius_m > outer_m);
     let off_m = |at_m: &[f64; 2]| circle.off_m(*at_m).abs();
     let mut roundabout = Roundabout {
         name: String::new(),
@@ -301,6 +308,12 @@ fn accesses(
     let Some(outermost) = roundabout.roads().last() else {
         return (vec![], vec![]);
     };
+    let centre_m = roundabout.centre_m();
+    let around_m = roundabout
+        .rings
+        .iter()
+        .map(Ring::outer_m)
+        .fold(0.0, f64::max);
     let (mut entries, mut exits): (Vec<Access>, Vec<Access>) = (vec![], vec![]);
     let mut lanes: Vec<usize> = roads
         .iter()
@@ -321,7 +334,9 @@ fn accesses(
         let pieces = [(&points_m[..=first], true), (&points_m[last..], false)];
         for (piece, is_entry) in pieces {
             let piece = Polyline::through(piece.iter().copied());
-            if piece.length_m() < LEAST_M {
+            let (far_m, _) = piece.at(if is_entry { 0.0 } else { piece.length_m() });
+            // Who has not come past all that it crosses does not say what that is.
+            if piece.length_m() < LEAST_M || distance_m(far_m, centre_m) < around_m {
                 continue;
             }
             let id = LaneId {

@@ -2,9 +2,9 @@
 
 use super::Situation;
 use super::lanes::course;
-use crate::ego::geodesy::Geodetic;
+use crate::ego::wrapped_rad;
 use crate::roadmap::{
-    DrivenRoundabout, DrivenWay, LaneKind, Roundabout, driven_roundabouts, simplified,
+    Access, Arm, DrivenRoundabout, DrivenWay, LaneKind, driven_roundabouts, simplified,
 };
 use crate::track::{Class, Object};
 
@@ -30,7 +30,6 @@ pub(super) struct Finder {
     trails: Vec<Trail>,
     /// How many ways began.
     begun: u64,
-    reference: Option<Geodetic>,
     found: Vec<DrivenRoundabout>,
 }
 
@@ -70,12 +69,6 @@ impl Finder {
 
     /// Takes in where everybody is. Gives whether something else is found than before.
     pub(super) fn take(&mut self, situation: &Situation<'_>) -> bool {
-        let was_found = !self.found.is_empty();
-        if self.reference != situation.reference {
-            self.reference = situation.reference;
-            self.trails.clear();
-            self.found.clear();
-        }
         let is_listed = |who: Who| match who {
             Who::Vehicle => situation.vehicle.is_some(),
             Who::Object(id) => situation.objects.iter().any(|object| object.id == id),
@@ -96,8 +89,7 @@ impl Finder {
                 self.extend(Who::Object(object.id), [x, y], kind);
             }
         }
-        let changed = self.look() && self.conclude();
-        changed || (was_found && self.found.is_empty())
+        self.look() && self.conclude()
     }
 
     fn extend(&mut self, who: Who, at_m: [f64; 2], kind: LaneKind) {
@@ -122,7 +114,7 @@ impl Finder {
         }
     }
 
-    /// A place for another way: of too many those go first that turn nowhere, then the oldest.
+    /// A place for another way: of too many the oldest goes, but those last that turn, or were not looked at.
     fn place(&mut self) -> Option<&mut Trail> {
         if self.trails.len() < MOST_WAYS {
             self.trails.push(Trail::default());
@@ -132,13 +124,17 @@ impl Finder {
             .trails
             .iter_mut()
             .filter(|trail| !matches!(trail.use_of, Use::Going(_)));
-        over.min_by_key(|trail| (trail.use_of == Use::Over, trail.way.is_some(), trail.number))
+        over.min_by_key(|trail| {
+            let tells = trail.way.is_some() || !trail.is_looked_at();
+            (trail.use_of == Use::Over, tells, trail.number)
+        })
     }
 
     /// Looks at one of the ways that have grown or are over. Gives whether it leads round something.
     fn look(&mut self) -> bool {
-        let grown = self.trails.iter_mut().find(|trail| !trail.is_looked_at());
-        grown.is_some_and(Trail::look)
+        let grown = self.trails.iter_mut().filter(|trail| !trail.is_looked_at());
+        let most = grown.max_by_key(|trail| (trail.use_of == Use::Over, trail.grown()));
+        most.is_some_and(Trail::look)
     }
 
     /// Gives whether that is something else than before.
@@ -154,10 +150,12 @@ impl Finder {
             && self.found.iter().zip(&found).all(|(a, b)| is_same(a, b));
         if is_same {
             // Places do not tremble; how much speaks for it may grow.
+            let mut changed = false;
             for (known, new) in self.found.iter_mut().zip(&found) {
+                changed |= known.confidence != new.confidence;
                 known.confidence = new.confidence;
             }
-            return false;
+            return changed;
         }
         self.found = found;
         true
@@ -186,12 +184,16 @@ impl Trail {
 
     /// Whether nothing has come since that would change it.
     fn is_looked_at(&self) -> bool {
-        let grown = self.points_m.len() - self.looked_at;
         match self.use_of {
             Use::Free => true,
-            Use::Going(_) => grown < GROWN,
-            Use::Over => grown == 0,
+            Use::Going(_) => self.grown() < GROWN,
+            Use::Over => self.grown() == 0,
         }
+    }
+
+    /// Places since it was looked at.
+    fn grown(&self) -> usize {
+        self.points_m.len() - self.looked_at
     }
 
     fn look(&mut self) -> bool {
@@ -206,15 +208,20 @@ impl Trail {
     }
 }
 
-/// Whether the same circles and arms were found, at the same place.
+/// Whether the same circles and arms were found, at the same place, the arms known as far.
 fn is_same(a: &DrivenRoundabout, b: &DrivenRoundabout) -> bool {
     const MOVED_M: f64 = 0.1;
+    const LONGER_M: f64 = 1.0;
+    const TURNED_RAD: f64 = 0.1;
     let (a, b) = (&a.roundabout, &b.roundabout);
-    let ways = |one: &Roundabout| -> Vec<[usize; 2]> {
-        let arms = one.arms.iter();
-        arms.map(|arm| [arm.entries.len(), arm.exits.len()])
-            .collect()
+    let is_same_way = |(a, b): (&Access, &Access)| {
+        let longer_m = a.way.length_m() - b.way.length_m();
+        longer_m.abs() < LONGER_M && wrapped_rad(a.mouth_rad - b.mouth_rad).abs() < TURNED_RAD
     };
+    let are_same =
+        |a: &[Access], b: &[Access]| a.len() == b.len() && a.iter().zip(b).all(is_same_way);
+    let is_same_arm =
+        |(a, b): (&Arm, &Arm)| are_same(&a.entries, &b.entries) && are_same(&a.exits, &b.exits);
     let rings = || a.rings.iter().zip(&b.rings);
     let is_near = |a: f64, b: f64| (a - b).abs() < MOVED_M;
     a.rings.len() == b.rings.len()
@@ -224,7 +231,8 @@ fn is_same(a: &DrivenRoundabout, b: &DrivenRoundabout) -> bool {
                 && is_near(a.circle.centre_m[0], b.circle.centre_m[0])
                 && is_near(a.circle.centre_m[1], b.circle.centre_m[1])
         })
-        && ways(a) == ways(b)
+        && a.arms.len() == b.arms.len()
+        && a.arms.iter().zip(&b.arms).all(is_same_arm)
 }
 
 /// The kind of way that a road user uses.

@@ -1,7 +1,7 @@
-//! May one enter now? Road users on the lanes of a roundabout that a map knows, and the gap
-//! between them (the thesis' question; the elements are those of its section 2.2).
+//! May one enter now? Road users on the lanes of a roundabout that a map knows, or that was found by who drives round
+//! it, and the gap between them (the thesis' question; the elements are those of its section 2.2).
 //!
-//! A layer of its own behind the tracks: it changes no object, and without a map it costs nothing.
+//! A layer of its own behind the tracks: it changes no object, and where there is no roundabout it only looks at who turns.
 //! It advises, and is no safety function.
 
 mod advice;
@@ -34,7 +34,7 @@ parameters! {
     /// Roundabouts: road users on their lanes, and the gap. Advice, and no safety function.
     pub struct RoundaboutParameters "roundabout" {
         /// Map of roads with the roundabout: OpenDaVINCI's scenario (.scn, .scnx) or OpenStreetMap
-        /// (.osm). If empty, nothing is said of roundabouts.
+        /// (.osm). If empty, only found ones are told of.
         map: Text = Text::default(), "";
         /// Where the map's origin lies in a local frame that has no place on the earth, as that of a sensor
         /// without poses: to the east, or to the right of the sensor's first place.
@@ -69,6 +69,8 @@ pub struct Situation<'a> {
     pub time: Time,
     /// Where the local frame, in which all that follows is, lies on the earth; if it does.
     pub reference: Option<Geodetic>,
+    /// Number of the local frame: places of different ones cannot be compared.
+    pub epoch: u32,
     /// The vehicle, if its pose is known.
     pub vehicle: Option<Pose>,
     /// Its speed.
@@ -89,6 +91,8 @@ pub struct Watcher {
     roundabouts: Vec<Roundabout>,
     origin: Option<Origin>,
     finder: Finder,
+    /// The local frame of what was found.
+    frame: Option<(Option<Geodetic>, u32)>,
     /// Where they lie in the local frame, and by which placing; behind those of the map the ones that were found.
     sites: Vec<Site>,
     placing: Option<Placing>,
@@ -113,6 +117,7 @@ impl Watcher {
             roundabouts: vec![],
             origin: None,
             finder: Finder::default(),
+            frame: None,
             sites: vec![],
             placing: None,
             watched: None,
@@ -168,6 +173,13 @@ impl Watcher {
 
     /// Takes in a revolution.
     pub fn watch(&mut self, situation: &Situation<'_>) {
+        let frame = (situation.reference, situation.epoch);
+        if self.frame != Some(frame) {
+            // What was found lies elsewhere now.
+            self.frame = Some(frame);
+            self.finder = Finder::default();
+            self.placing = None;
+        }
         self.place(situation);
         let is_mapped = |watched| watched < self.roundabouts.len();
         if self.parameters.find && !self.watched.is_some_and(is_mapped) {
@@ -374,7 +386,7 @@ impl Watcher {
         let mut said = Crossing::of(asked, motion, comers, unseen, &self.parameters);
         let since = self.since.unwrap_or(situation.time);
         let is_fresh = (situation.time - since).seconds() < FIRST_LOOK_S;
-        if is_fresh && situation.sight.is_some() {
+        if is_fresh && situation.sight.is_some() && !asked.conflicts.is_empty() {
             said.hindered(said.hindrance.unwrap_or(Hindrance::Unseen));
         }
         said

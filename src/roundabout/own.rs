@@ -145,7 +145,9 @@ impl Own {
         if !matches!(self.state, State::Circling | State::Leaving) {
             return None;
         }
-        let along_m = match on_way(&exit.way, pose) {
+        // Before its begin the way is that of the circle.
+        let station = on_way(&exit.way, pose).filter(|station| station.along_m > 0.0);
+        let along_m = match station {
             Some(station) => station.along_m,
             None if self.state == State::Circling => {
                 let circle = site.rings[site.outermost_road()?].circle;

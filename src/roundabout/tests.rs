@@ -59,6 +59,7 @@ fn situation(objects: &[Object]) -> Situation<'_> {
     Situation {
         time: NOW,
         reference: None,
+        epoch: 0,
         vehicle: Some(Pose {
             position_m: [0.0; 3],
             yaw_rad: PI / 2.0,
@@ -297,6 +298,25 @@ fn what_a_map_knows_is_not_found_again() {
     drive_past(&mut watcher, CENTRE_M);
     assert!(watcher.found().is_empty(), "{:?}", watcher.found());
     assert_eq!(watcher.advice().unwrap().confidence, 1.0);
+    // Nor is it there twice where the map comes later.
+    let mut watcher = Watcher::new(&RoundaboutParameters::profile(Profile::Default));
+    drive_past(&mut watcher, CENTRE_M);
+    assert!(watcher.advice().unwrap().confidence < 1.0);
+    let roads = scenario::find("roundabout-traffic").unwrap().roads();
+    watcher.take_map(&roads.unwrap());
+    watcher.watch(&situation(&[]));
+    assert_eq!(watcher.advice().unwrap().confidence, 1.0);
+    assert_eq!(watcher.sites.len(), 1);
+}
+
+#[test]
+fn what_was_found_in_another_frame_is_forgotten() {
+    let mut watcher = Watcher::new(&RoundaboutParameters::profile(Profile::Default));
+    drive_past(&mut watcher, CENTRE_M);
+    assert!(watcher.advice().is_some());
+    let nobody = situation(&[]);
+    watcher.watch(&Situation { epoch: 1, ..nobody });
+    assert!(watcher.found().is_empty() && watcher.advice().is_none());
 }
 
 /// Each corner has a middle of its own.

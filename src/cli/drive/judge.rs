@@ -108,39 +108,49 @@ impl Judge {
         outcome
     }
 
-    /// The first encounter with one of the others that is one.
+    /// The worst encounter with one of the others.
     fn encounter(&self, other: usize) -> Option<Encounter> {
-        self.revolutions
+        self.contact(other).or_else(|| {
+            let is_missed = |index| self.is_missed(index, other);
+            (0..self.revolutions.len())
+                .any(is_missed)
+                .then_some(Encounter::NearMiss)
+        })
+    }
+
+    /// The first time that both are at one place.
+    fn contact(&self, other: usize) -> Option<Encounter> {
+        let mut revolutions = self.revolutions.iter();
+        let now = revolutions.find(|now| now.own.overlaps(&now.others[other]))?;
+        let there = &now.others[other];
+        let is_run_into = match now.part {
+            Part::Entry => false,
+            // Who comes into the circle, or comes up from behind, would have had to give way.
+            Part::Circle => !now.own.runs_into(there),
+            Part::Exit => now.own.is_run_into_by(there),
+        };
+        Some(if is_run_into {
+            Encounter::RunInto
+        } else {
+            Encounter::Collision
+        })
+    }
+
+    /// Whether one of the others comes too soon to where the vehicle is in a revolution.
+    fn is_missed(&self, index: usize, other: usize) -> bool {
+        let now = &self.revolutions[index];
+        let later = self.revolutions[index + 1..]
             .iter()
-            .enumerate()
-            .find_map(|(index, now)| {
-                let near = self.revolutions[index..]
-                    .iter()
-                    .take_while(|later| later.time_s - now.time_s < NEAR_MISS_S);
-                let mut near = near.map(|later| &later.others[other]);
-                let first = near.next()?;
-                if now.own.overlaps(first) {
-                    let is_run_into = match now.part {
-                        Part::Entry => false,
-                        // Who comes into the circle, or comes up from behind, would have had to give way.
-                        Part::Circle => !now.own.runs_into(first),
-                        Part::Exit => now.own.is_run_into_by(first),
-                    };
-                    return Some(match is_run_into {
-                        true => Encounter::RunInto,
-                        false => Encounter::Collision,
-                    });
-                }
-                let is_missed = match now.part {
-                    Part::Circle => false,
-                    Part::Entry => near.any(|there| now.own.overlaps(there)),
-                    // Who follows it out comes later than who crosses.
-                    Part::Exit => {
-                        near.any(|there| now.own.overlaps(there) && !now.own.goes_along_with(there))
-                    }
-                };
-                is_missed.then_some(Encounter::NearMiss)
-            })
+            .take_while(|later| later.time_s - now.time_s < NEAR_MISS_S);
+        let mut later = later.map(|later| &later.others[other]);
+        match now.part {
+            Part::Circle => false,
+            Part::Entry => later.any(|there| now.own.overlaps(there)),
+            // Who follows it out comes later than who crosses.
+            Part::Exit => {
+                later.any(|there| now.own.overlaps(there) && !now.own.goes_along_with(there))
+            }
+        }
     }
 }
 

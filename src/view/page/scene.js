@@ -104,7 +104,7 @@ function drawRoundabout(context, camera, { roundabout, groundZ }, colours) {
   camera.enterPlane(context, { x: roundabout.x, y: roundabout.y, yaw: 0 }, groundZ);
   context.strokeStyle = colours.path;
   for (const { kind, radius, width } of rings) {
-    context.globalAlpha = (kind === 0 ? 0.22 : 0.1) * confidence;
+    context.globalAlpha = (kind === 0 ? 0.22 : 0.1) * (confidence || 1);
     context.lineWidth = width;
     context.beginPath();
     context.arc(0, 0, radius, 0, 2 * Math.PI);
