@@ -15,6 +15,8 @@ const LONG_GAP_S: f64 = 4.0;
 const CLEARLY_S: f64 = 0.25;
 /// Times to the conflict point are compared from so early.
 const HORIZON_S: std::ops::Range<f64> = 2.5..3.5;
+/// What was said of a time so far off was of another coming, at which he left after all.
+const ANOTHER_S: f64 = 10.0;
 /// Stay or exit is judged so long before the conflict point.
 const JUDGED_S: f64 = 1.5;
 /// Farther apart are two different things.
@@ -222,7 +224,8 @@ impl Comings {
     fn has_come(&mut self, comer: (u32, usize), now_s: f64) {
         let predictions = self.expected.remove(&comer).unwrap_or_default();
         let errors_s = predictions.iter().map(|at_s| (at_s - now_s).abs());
-        self.errors_s.extend(errors_s);
+        self.errors_s
+            .extend(errors_s.filter(|off_s| *off_s < ANOTHER_S));
         if let Some((stays, _)) = self.stays.remove(&comer) {
             self.judged[0] += usize::from(stays);
             self.judged[1] += 1;
