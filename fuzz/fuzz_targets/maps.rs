@@ -51,6 +51,7 @@ fn watched(map: &Roadmap, centre_m: [f64; 2]) {
         watcher.watch(&Situation {
             time: Time::from_micros(100_000 * i64::from(step)),
             reference: None,
+            epoch: 0,
             vehicle: Some(vehicle),
             vehicle_speed_mps: 3.0,
             objects: &objects,
@@ -60,9 +61,11 @@ fn watched(map: &Roadmap, centre_m: [f64; 2]) {
             continue;
         };
         for arm in &advice.arms {
-            assert!(
-                arm.gap_s.is_finite() && arm.margin_s.is_finite() && arm.bearing_rad.is_finite()
-            );
+            for crossing in [&arm.entry, &arm.exit] {
+                assert!(crossing.gap_s.is_finite() && crossing.margin_s.is_finite());
+                assert!(crossing.stop_m.is_finite());
+            }
+            assert!(arm.bearing_rad.is_finite());
         }
         for window in &advice.windows {
             assert!(
