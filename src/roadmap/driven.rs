@@ -1,4 +1,6 @@
 //! Roundabouts that no map knows, by the ways of those who drive round them.
+//!
+//! Numbers without another source were set with `scripts/evaluate-roundabouts --seeds 1-6`.
 
 use std::f64::consts::PI;
 
@@ -6,8 +8,8 @@ use super::arms::{access, arms};
 use super::circle::Circle;
 use super::polyline::distance_m;
 use super::rings::{
-    Bend, Group, LEAST_COVERED, OFF_CIRCLE_M, SAME_CENTRE_M, SAME_RADIUS_M, bends, covered_share,
-    grouped,
+    Bend, Group, LEAST_COVERED, LEAST_SWEEP_RAD, OFF_CIRCLE_M, RADII_M, SAME_CENTRE_M,
+    SAME_RADIUS_M, bends, covered_share, grouped,
 };
 use super::roundabout::{Access, Ring, Roundabout, Source};
 use super::{LaneId, LaneKind, Polyline};
@@ -33,8 +35,6 @@ pub struct DrivenRoundabout {
 
 /// Less than this, all together, leads round no circle.
 const LEAST_SWEPT_RAD: f64 = 1.5 * PI;
-/// Turns of less than this are no part of a circle.
-const LEAST_TURN_RAD: f64 = PI / 4.0;
 /// Directions of a way are told from points so many apart: measured places scatter.
 const APART: usize = 4;
 /// So much of it is looked at before and behind its turns.
@@ -56,8 +56,8 @@ impl DrivenWay {
 
 /// The part of a way in which it turns by as much as a piece of a circle does.
 fn turning(points_m: &[[f64; 2]]) -> Option<[usize; 2]> {
-    /// A radian in 60 m.
-    const STEP_RAD: f64 = APART as f64 / 60.0;
+    /// As the widest circle turns, where points are a metre apart.
+    const STEP_RAD: f64 = APART as f64 / *RADII_M.end();
     let heading_rad = |index: usize| {
         let [from_m, to_m] = [points_m[index], points_m[index + APART]];
         libm::atan2(to_m[1] - from_m[1], to_m[0] - from_m[0])
@@ -69,7 +69,7 @@ fn turning(points_m: &[[f64; 2]]) -> Option<[usize; 2]> {
     let last = (first..count).rfind(is_turn)?;
     let turned_rad: f64 = (first..=last).map(|index| step_rad(index).abs()).sum();
     let to = (last + 2 * APART + AROUND).min(points_m.len());
-    (turned_rad / APART as f64 >= LEAST_TURN_RAD).then_some([first.saturating_sub(AROUND), to])
+    (turned_rad / APART as f64 >= LEAST_SWEEP_RAD).then_some([first.saturating_sub(AROUND), to])
 }
 
 /// Roundabouts that ways lead round.
@@ -144,13 +144,6 @@ fn around(ways: &[DrivenWay], groups: &[Group], first: &Group) -> Option<DrivenR
         .collect();
     let mut rings = rings(ways, &members, centre_m);
     set_widths(&mut rings);
-    // Cyclists on the road have no way of their own.
-    let outer_m = rings
-        .iter()
-        .filter(|ring| ring.kind == LaneKind::Road)
-        .map(Ring::outer_m)
-        .fold(0.0, f64::max);
-    rings.retain(|ring| ring.kind == LaneKind::Road || ring.circle.radius_m > outer_m);
     let off_m = |at_m: &[f64; 2]| circle.off_m(*at_m).abs();
     let mut roundabout = Roundabout {
         name: String::new(),
@@ -161,6 +154,11 @@ fn around(ways: &[DrivenWay], groups: &[Group], first: &Group) -> Option<DrivenR
         off_circle_m: first.runs().iter().flatten().map(off_m).fold(0.0, f64::max),
         covered_share,
     };
+    // Cyclists on the road have no way of their own.
+    let outer_m = roundabout.outer_m();
+    roundabout
+        .rings
+        .retain(|ring| ring.kind == LaneKind::Road || ring.circle.radius_m > outer_m);
     let (entries, exits) = accesses(ways, &roundabout, &roads);
     roundabout.arms = arms(entries, exits, is_clockwise);
     Some(DrivenRoundabout {

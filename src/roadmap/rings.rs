@@ -12,14 +12,14 @@ use crate::ego::wrapped_rad;
 
 /// Radii that the middle of a lane round a roundabout may have: the smallest mini roundabouts
 /// have an outer diameter of 13 m, large ones 100 m.
-const RADII_M: std::ops::RangeInclusive<f64> = 3.0..=60.0;
+pub(super) const RADII_M: std::ops::RangeInclusive<f64> = 3.0..=60.0;
 /// Points of a lane that belong to one circle are within this of it. Maps are drawn by hand, to
 /// tenths of a metre, and OpenStreetMap's circles are polygons.
 pub(super) const OFF_CIRCLE_M: f64 = 0.6;
 /// The same of a corner, which is shorter and meets straight lines.
 const OFF_CORNER_M: f64 = 0.1;
 /// Least sweep of a piece of a lane that tells a circle.
-const LEAST_SWEEP_RAD: f64 = PI / 4.0;
+pub(super) const LEAST_SWEEP_RAD: f64 = PI / 4.0;
 /// Pieces of one circle have their middles within this of each other.
 pub(super) const SAME_CENTRE_M: f64 = 3.0;
 /// And their radii, if they are one lane.

@@ -1,4 +1,6 @@
 //! Who drove where, for roundabouts that no map knows.
+//!
+//! Numbers were set by reasoning, and tried with `scripts/evaluate-roundabouts --seeds 1-6`.
 
 use super::Situation;
 use super::lanes::course;
@@ -12,13 +14,13 @@ use crate::track::{Class, Object};
 const MOVING_MPS: f64 = 0.8;
 /// Places of a way are so far apart.
 const APART_M: f64 = 1.0;
-/// Farther than this nobody goes between two revolutions: it is another way, or another frame.
+/// Farther than this nobody goes between two places of a way: it is another one.
 const LEAP_M: f64 = 8.0;
 /// A way is looked at anew when it has grown by so many places.
 const GROWN: usize = 15;
 /// No way longer than this is kept: its older half goes.
 const LONGEST: usize = 240;
-/// Ways that are kept: at first those go that turn nowhere, then the oldest.
+/// Ways that are kept.
 const MOST_WAYS: usize = 48;
 /// What is found with less confidence is not told.
 const LEAST_CONFIDENCE: f64 = 0.6;

@@ -144,6 +144,10 @@ impl Watcher {
     /// Forgets who was where, and what was found.
     pub fn reset(&mut self) {
         self.forget();
+        self.forget_found();
+    }
+
+    fn forget_found(&mut self) {
         self.finder = Finder::default();
         self.placing = None;
     }
@@ -177,8 +181,7 @@ impl Watcher {
         if self.frame != Some(frame) {
             // What was found lies elsewhere now.
             self.frame = Some(frame);
-            self.finder = Finder::default();
-            self.placing = None;
+            self.forget_found();
         }
         self.place(situation);
         let is_mapped = |watched| watched < self.roundabouts.len();

@@ -69,8 +69,8 @@ impl Driver {
     pub(super) fn speed_mps(&mut self, truth: &Truth, advice: Option<&Advice>) -> f64 {
         let now_mps = truth.sensor_speed_mps;
         // The first revolution is over when it is asked first.
-        let before_mps = self.last_mps.replace(now_mps).or(Some(now_mps));
-        self.gone_m += before_mps.map_or(0.0, |before_mps| 0.5 * (before_mps + now_mps) * STEP_S);
+        let before_mps = self.last_mps.replace(now_mps).unwrap_or(now_mps);
+        self.gone_m += 0.5 * (before_mps + now_mps) * STEP_S;
         let bends = (0..AHEAD_M).map(|ahead_m| {
             let ahead_m = ahead_m as f64;
             let curvature_per_m = curvature_per_m(&self.way, self.gone_m + ahead_m).abs();
