@@ -107,18 +107,6 @@ impl Forecasts {
         }
     }
 
-    /// Whether one of several people who stand side by side is the one that is the nearest to a
-    /// track.
-    pub(super) fn is_nearest(&self, track: usize, patches: &[Patch], number: usize) -> bool {
-        let [before, after] = patches[number].beside;
-        let [x, y] = self.forecasts[track].middle_m;
-        let off_m = |number: usize| {
-            let [east_m, north_m] = patches[number].bounds.middle_m();
-            (east_m - x).powi(2) + (north_m - y).powi(2)
-        };
-        (number - before..=number + after).all(|other| off_m(number) <= off_m(other))
-    }
-
     /// Where the track with this number is expected.
     pub(super) fn of(&self, track: usize) -> &Forecast {
         &self.forecasts[track]

@@ -36,19 +36,12 @@ pub(super) struct Look {
     pub(super) range_m: f64,
     /// Hardly anything below the belt of a vehicle is seen.
     pub(super) is_upper: bool,
-    /// How much farther than the next ray an end may be, because between its ends, too, not every
-    /// ray meets it.
-    pub(super) gap_m: f64,
     /// Its leftmost and rightmost returns, seen from the sensor.
     pub(super) ends_m: [Vector2<f64>; 2],
     /// Something nearer hides what is to the left or to the right.
     pub(super) is_cut: [bool; 2],
-    /// It is one of several people.
-    pub(super) is_one_of_several: bool,
     /// Where the sensor is at the end.
     pub(super) sensor_m: Vector2<f64>,
-    /// Its velocity over the ground, 0 where no pose is known.
-    pub(super) sensor_mps: Vector2<f64>,
     /// Returns whose place was seen empty before, and something in it.
     pub(super) new: f64,
     pub(super) old: f64,
@@ -128,13 +121,10 @@ impl Look {
             roughness_m: roughness_m(spots, scan),
             goes_on: columns.goes_on(),
             range_m,
-            gap_m: range_m * scan.step_rad().abs() * columns.missed_between(scan),
             is_upper: f64::from(low) < (LOW_SHARE * count).max(2.0),
             ends_m,
             is_cut: cuts(lowest_layer..=highest_layer, columns.ends, scan),
-            is_one_of_several: false,
             sensor_m,
-            sensor_mps: Vector2::zeros(),
             new: if is_upright { new } else { 0.0 },
             old: if is_upright { old } else { old + new },
         }
@@ -226,15 +216,6 @@ impl<'a> Columns<'a> {
     /// Share of the columns in which it goes on above.
     fn goes_on(&self) -> f64 {
         f64::from(self.going_on) / f64::from(self.seen_above.max(1))
-    }
-
-    /// Columns without a return for each one with a return, from end to end.
-    fn missed_between(&self, scan: &Scan) -> f64 {
-        let [left, right] = self.ends.map(|end| scan.column(end.point as usize));
-        let apart = left.abs_diff(right);
-        let across = apart.min(scan.columns() - apart) + 1;
-        let met = self.met as usize;
-        across.saturating_sub(met) as f64 / met as f64
     }
 }
 
@@ -379,7 +360,6 @@ mod tests {
         });
         let columns = Columns::of(&spots, &scan);
         assert_eq!(columns.goes_on(), 0.25);
-        assert_eq!(columns.missed_between(&scan), 0.9);
     }
 
     #[test]

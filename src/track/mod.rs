@@ -2,7 +2,7 @@
 //!
 //! `objects` takes a revolution in: `patches` takes its clusters, after `thinning` them, with what goes
 //! on `above` them, by `placing` them, what drives along with the sensor over the `seam` of the sweep as one, and
-//! divides them into `parts` that do not touch on the `floor`, and `people` side by side;
+//! divides them into `parts` that do not touch on the `floor`;
 //! `grouping` says which `spots` belong together, given what each track `claims` by its `forecast`
 //! and the `strays` near it, `assignment` what is whose, `sight` what is hidden and what is gone;
 //! `nearby` spares all of them what is far away. A `road_user` learns from each `look`, and the
@@ -49,8 +49,6 @@ mod objects;
 mod parts;
 
 mod patches;
-
-mod people;
 
 mod placing;
 

@@ -586,37 +586,6 @@ mod tests {
         assert_eq!((&of_one[..], &of_both[..]), (&[0][..], &[1, 2][..]));
     }
 
-    #[test]
-    fn two_people_are_two_once_their_heads_were_seen() {
-        let person = |first: usize, top: usize| {
-            move |column: usize| match column.checked_sub(first)? {
-                5..10 => Some(top),
-                ..15 => Some(6),
-                _ => None,
-            }
-        };
-        let pair = |top: usize| {
-            let (left, right) = (person(100, top), person(115, top));
-            scan_of(1800, |column, layer| {
-                let highest = left(column).or(right(column));
-                let is_met = highest.is_some_and(|highest| (4..=highest).contains(&layer));
-                u16::from(is_met) * 1000
-            })
-        };
-        let mut tracker = ObjectTracker::default();
-        let mut counts = vec![];
-        for revolution in 0..15 {
-            // The heads are between two layers at first, and again in the end.
-            let top = if (5..10).contains(&revolution) { 7 } else { 6 };
-            see(
-                &mut tracker,
-                &later(&pair(top), 0.1 * f64::from(revolution)),
-            );
-            counts.push(tracker.tracks.len());
-        }
-        assert_eq!((counts[4], counts[9], counts[14]), (1, 2, 2), "{counts:?}");
-    }
-
     /// A track that was seen once.
     fn track_of(id: u32, spots: &[Spot], scan: &Scan) -> Track {
         let look = Look::at(spots, scan, Vector2::zeros());

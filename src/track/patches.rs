@@ -7,7 +7,7 @@ use super::parts::{CUT_M, Parts};
 use super::placing::{Bounds, Placed, Placing};
 use super::spots::seen_before;
 use super::thinning::Thinning;
-use super::{Scene, TrackParameters, people};
+use super::{Scene, TrackParameters};
 use crate::beams::{Hints, Seen};
 use crate::cluster::Clusters;
 
@@ -27,8 +27,6 @@ pub(super) struct Patch {
     pub(super) before: Seen,
     /// How many returns each of its own stands for, on average.
     pub(super) returns_each: f32,
-    /// One of several people: their patches follow each other, so many before this one and after.
-    pub(super) beside: [usize; 2],
 }
 
 impl Patch {
@@ -36,11 +34,6 @@ impl Patch {
     pub(super) fn diagonal_m(&self) -> f64 {
         let side_m = |axis: usize| f64::from(self.bounds.high_m[axis] - self.bounds.low_m[axis]);
         (side_m(0) * side_m(0) + side_m(1) * side_m(1)).sqrt()
-    }
-
-    /// Whether it is one of several people side by side.
-    pub(super) fn is_one_of_several(&self) -> bool {
-        self.beside != [0; 2]
     }
 
     /// Whether it can be a road user as a whole.
@@ -68,7 +61,7 @@ pub(super) struct Placer {
     newcomers: Newcomers,
     /// The tracks that move and may be in a patch.
     near: Vec<usize>,
-    /// The patches before people were told apart, and where one of them is cut.
+    /// The patches before newcomers were parted from them, and where one of them is cut.
     former: Vec<Patch>,
     cuts: Vec<usize>,
 }
@@ -119,7 +112,6 @@ impl Placer {
                 is_suspect: false,
                 before: Seen::Unknown,
                 returns_each,
-                beside: [0; 2],
             };
             if whole.diagonal_m() < SMALLEST_DIVIDED_M {
                 self.placed.extend(self.cluster.iter());
@@ -135,7 +127,6 @@ impl Placer {
         }
         self.look_back(forecasts, scene);
         self.part_newcomers(forecasts, scene);
-        self.tell_people_apart(scene);
     }
 
     /// Looks up what was in the place of every return before. What moves may have been there itself.
@@ -203,37 +194,6 @@ impl Placer {
         }
     }
 
-    /// Makes a patch of each of several people that are one.
-    fn tell_people_apart(&mut self, scene: &Scene<'_>) {
-        std::mem::swap(&mut self.patches, &mut self.former);
-        self.patches.clear();
-        for patch in &self.former {
-            let placed = &self.placed[patch.begin..patch.end];
-            if patch.goes_on {
-                self.cuts.clear();
-            } else {
-                people::cuts(placed, &patch.bounds, scene.scan, &mut self.cuts);
-            }
-            if self.cuts.is_empty() {
-                self.patches.push(*patch);
-                continue;
-            }
-            let mut begin = patch.begin;
-            let count = self.cuts.len();
-            let ends = self.cuts.iter().map(|cut| patch.begin + cut);
-            for (number, end) in ends.chain([patch.end]).enumerate() {
-                self.patches.push(Patch {
-                    begin,
-                    end,
-                    bounds: Bounds::of(&self.placed[begin..end]),
-                    beside: [number, count - number],
-                    ..*patch
-                });
-                begin = end;
-            }
-        }
-    }
-
     /// The parts of all clusters.
     pub(super) fn patches(&self) -> &[Patch] {
         &self.patches
@@ -264,7 +224,6 @@ impl Placer {
                     is_suspect: false,
                     before: Seen::Unknown,
                     returns_each: 1.0,
-                    beside: [0; 2],
                 });
             });
     }

@@ -134,15 +134,12 @@ impl Shape {
             let is_whole = view.is_whole()[axis];
             let is_too_wide = axis == 1 && self.seen_m[1] > self.widest_m();
             let is_thin = axis == 1 && is_whole && extent[0] > LONG_M;
-            let gain = if look.is_one_of_several {
-                // What was known is the size of all of them.
-                1.0
-            } else if (is_too_wide || is_thin) && fresh_m < self.seen_m[1] {
+            let gain = if (is_too_wide || is_thin) && fresh_m < self.seen_m[1] {
                 CORRECT
             } else {
                 gain
             };
-            if fresh_m > self.seen_m[axis] || is_whole || is_too_wide || look.is_one_of_several {
+            if fresh_m > self.seen_m[axis] || is_whole || is_too_wide {
                 self.seen_m[axis] += gain * (fresh_m - self.seen_m[axis]);
             }
             let clear = (CLEAR_RANGE_M / look.range_m.max(1.0)).min(1.0);

@@ -1,5 +1,5 @@
-//! Returns of no cluster in the places of known objects: far away too few meet a cyclist to be a
-//! cluster.
+//! Returns of no cluster in the places of known road users: far away too few meet a cyclist to be
+//! a cluster.
 
 use std::ops::Range;
 
@@ -43,7 +43,9 @@ impl Strays {
         let origin_m = placement.origin_m();
         self.note_seen(tracks.len(), spots);
         for (number, track) in tracks.iter().enumerate() {
-            if !track.is_confirmed() || !track.is_sparse() || track.rests() {
+            // Of structure, of which there is much, strays would show another piece in each revolution.
+            let is_known = track.is_published || track.has_moved();
+            if !is_known || !track.is_confirmed() || !track.is_sparse() {
                 continue;
             }
             let place = track.rectangle();

@@ -30,8 +30,6 @@ pub(super) struct View {
     cosine: f64,
     /// Standard deviation of an edge.
     edge_m: f64,
-    /// How much farther either axis may reach where not every ray meets it.
-    gap_m: [f64; 2],
 }
 
 /// Cosine from which on a side is looked at rather than an end.
@@ -67,7 +65,6 @@ impl View {
             sine,
             cosine,
             edge_m: EDGE_M + EDGE_PER_M * look.range_m,
-            gap_m: [0, 1].map(|axis: usize| look.gap_m * left[axis].abs()),
         };
         for axis in 0..2 {
             // An end that lies to a hidden side is not the object's own.
@@ -146,13 +143,7 @@ impl View {
             } else {
                 0.0
             };
-            // What stands shows its ends in the course of time.
-            let gap_m = if is_moving_vehicle {
-                self.gap_m[axis]
-            } else {
-                0.0
-            };
-            let edge_m = self.edge_m + gap_m + inset_m;
+            let edge_m = self.edge_m + inset_m;
             // What drives out of sight is not seen up to its ends, whatever hides it.
             let is_piece = axis == 0
                 && is_moving_vehicle
@@ -246,28 +237,6 @@ mod tests {
         let (x_m, deviation_m) = centre_x_m(0.0, false);
         assert_eq!(x_m, centre_x_m(2.0, false).0);
         assert!(deviation_m < 0.3);
-    }
-
-    #[test]
-    fn the_ends_of_what_drives_are_unsure_where_not_every_ray_meets_it() {
-        // The side of a car, 33 m away, behind a hedge that one column of so many sees through.
-        let edge_m = |every: usize, is_moving_vehicle: bool| {
-            let scan = scan_of(1800, |column, layer| match column {
-                0..36 if column % every == 0 && (6..8).contains(&layer) => 3300,
-                _ => 0,
-            });
-            let spots = spots_of(&scan);
-            let look = Look::at(&spots, &scan, Vector2::zeros());
-            let view = View::of(&look, &spots, 0.0);
-            let middle_m = look.middle_m + Vector2::new(0.0, 0.9);
-            let size_m = [view.extent_m()[0], 1.8];
-            let (_, noise) = view.centre(size_m, [0.0; 2], middle_m, 0.0, is_moving_vehicle);
-            libm::sqrt(noise[(0, 0)])
-        };
-        let whole_m = edge_m(1, true);
-        // For each of 8 columns that meet it 3.5 do not, each 12 cm wide.
-        assert!((edge_m(5, true) - whole_m - 3.5 * 0.115).abs() < 0.02);
-        assert!((edge_m(5, false) - whole_m).abs() < 0.01);
     }
 
     #[test]

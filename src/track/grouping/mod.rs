@@ -42,8 +42,6 @@ pub(super) struct Grouping {
     target: Vec<usize>,
     /// How many large patches each track has.
     large_patches: Vec<u32>,
-    /// Group numbers of people who are told apart.
-    people: Vec<u32>,
     /// Group numbers of what was cut off structure, ascending.
     suspects: Vec<u32>,
 }
@@ -124,7 +122,6 @@ impl Grouping {
     /// can be a road user.
     fn divide(&mut self, tracks: &[Track], scene: &Scene<'_>, parameters: &TrackParameters) {
         self.suspects.clear();
-        self.people.clear();
         self.large_patches.clear();
         self.large_patches.resize(tracks.len(), 0);
         self.spots.clear();
@@ -144,12 +141,6 @@ impl Grouping {
             let is_old = patch.before == Seen::Occupied;
             self.claims
                 .settle(placed, &self.near, &self.forecasts, is_whole, is_old);
-            if patch.is_one_of_several() {
-                let owners = self.claims.owners().flatten();
-                let people = owners.filter(|track| !tracks[*track].is_vehicle());
-                self.people.extend(people.map(|track| track as u32));
-                self.people.push(own);
-            }
             let owner = is_whole
                 .then(|| self.owner(&patch, tracks, scene.scan.time()))
                 .flatten()
@@ -196,12 +187,6 @@ impl Grouping {
         self.near.clear();
         self.near.extend(self.forecasts.near(patch));
         let forecasts = &self.forecasts;
-        if patch.is_one_of_several() {
-            // Each of several people is somebody, unless a car was taken for them.
-            self.near.retain(|track| {
-                tracks[*track].is_vehicle() || forecasts.is_nearest(*track, patches, number)
-            });
-        }
         if patch.before == Seen::Empty {
             // It is before what stands there, and none of it.
             self.near.retain(|track| !tracks[*track].is_background());
@@ -281,7 +266,6 @@ impl Grouping {
     /// Forms groups of stretches that have the same number, and looks at those that are new.
     fn put_together(&mut self, tracks: &[Track], scene: &Scene<'_>) {
         let sensor_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
-        let sensor_mps = Vector2::from(scene.sweep.velocity_mps(scene.scan.duration_s()));
         self.groups.clear();
         self.sorted.clear();
         self.stretches
@@ -298,7 +282,6 @@ impl Grouping {
             if spots.len() < FEWEST_RETURNS && claimed_by.is_none() {
                 continue;
             }
-            let is_one_of_several = self.people.contains(&number);
             let look = match own {
                 [
                     Stretch {
@@ -306,11 +289,7 @@ impl Grouping {
                         ..
                     },
                 ] => self.former[*place].look,
-                _ => Look {
-                    is_one_of_several,
-                    sensor_mps,
-                    ..Look::at(spots, scene.scan, sensor_m)
-                },
+                _ => Look::at(spots, scene.scan, sensor_m),
             };
             self.groups.push(Group {
                 number,

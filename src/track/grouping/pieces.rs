@@ -2,7 +2,7 @@
 
 use nalgebra::Vector2;
 
-use super::{Group, Grouping, Scene, Track, bounds_m, extent};
+use super::{Group, Grouping, Scene, Track, bounds_m};
 
 /// Two free groups this close may be pieces of one vehicle.
 const GAP_M: f64 = 0.45;
@@ -17,7 +17,7 @@ impl Grouping {
         );
         free.clear();
         for (number, group) in self.groups.iter().enumerate() {
-            if group.claimed_by.is_none() && !group.look.is_one_of_several {
+            if group.claimed_by.is_none() {
                 free.push((number, self.bounds(group)));
             }
         }
@@ -39,57 +39,10 @@ impl Grouping {
                 }
             }
         }
-        for (number, bounds) in &free {
-            if let Some(owner) = self.missing_part(tracks, *number, bounds) {
-                target[*number] = owner;
-                joined = true;
-            }
-        }
         (self.free, self.target) = (free, target);
         if joined {
             self.gather_joined(tracks, scene);
         }
-    }
-
-    /// The group of a vehicle whose bumper or rear a free group can be: a bonnet that rises
-    /// towards the screen leaves a gap between two layers.
-    fn missing_part(
-        &self,
-        tracks: &[Track],
-        free: usize,
-        [low_m, high_m]: &[Vector2<f64>; 2],
-    ) -> Option<usize> {
-        /// Between a bumper and the foot of a screen.
-        const BONNET_M: f64 = 1.6;
-        /// Narrower ones are people.
-        const NARROWEST_M: f64 = 0.9;
-        let group = &self.groups[free];
-        if (high_m - low_m).norm() < NARROWEST_M {
-            return None;
-        }
-        self.groups.iter().position(|other| {
-            let Some(track) = other.claimed_by.map(|number| &tracks[number]) else {
-                return false;
-            };
-            let apart_m = (other.look.middle_m - group.look.middle_m).norm();
-            if !track.is_moving_vehicle() || apart_m > track.rectangle().length_m {
-                return false;
-            }
-            let axes = |group: &Group| {
-                let spots = self.spots(group);
-                extent(spots, track.yaw_rad())
-            };
-            let ([low, high], [other_low, other_high]) = (axes(group), axes(other));
-            let size = [
-                track.rectangle().length_m + 0.2,
-                track.rectangle().width_m + 0.3,
-            ];
-            let gap_m = (low[0] - other_high[0]).max(other_low[0] - high[0]);
-            gap_m < BONNET_M
-                && (0..2).all(|axis| {
-                    high[axis].max(other_high[axis]) - low[axis].min(other_low[axis]) <= size[axis]
-                })
-        })
     }
 
     fn bounds(&self, group: &Group) -> [Vector2<f64>; 2] {

@@ -21,8 +21,6 @@ const LONG_M: f64 = 2.5;
 const SLOWEST_MPS: f64 = 0.3;
 /// Probability of standing below which something moves.
 const HARDLY_STANDS: f64 = 0.1;
-/// How much higher than known something may be where a ray passes far away.
-const HIGHER_M: f64 = 0.4;
 
 impl Track {
     /// Takes a group in that is this object.
@@ -57,9 +55,7 @@ impl Track {
         self.range_m = look.range_m;
         self.floor_z_m = floor_z_m;
         self.roughness_m += 0.2 * (look.roughness_m - self.roughness_m);
-        if !self.may_be_own(look.top_below_m) {
-            self.goes_on += 0.2 * (look.goes_on - self.goes_on);
-        }
+        self.goes_on += 0.2 * (look.goes_on - self.goes_on);
         if let Some(fresh_m) = look.upper_m {
             let known_m = self.upper_m.get_or_insert(fresh_m);
             let gain = if fresh_m > *known_m { 0.3 } else { 0.05 };
@@ -72,20 +68,10 @@ impl Track {
         self.newness.learn(look, self.usual_points);
         self.trace.push(seen_at, self.motion.estimate().position_m);
         self.note_motion(look);
-        self.is_carried = self.goes_like_a_rail(look, spots);
         if self.parted.is_renewed_by(look.points, seen_at) {
             self.parted = Parting::of(&self.motion.estimate(), look.points, seen_at);
         }
         self.belief.learn(&Belief::of(&self.qualities()), 0.3);
-    }
-
-    /// Whether what the next ray meets above the group may be more of the object: far away, a lorry
-    /// is a group for each layer.
-    fn may_be_own(&self, above_m: f64) -> bool {
-        /// Share of the width from which on it was seen from side to side.
-        const WHOLE: f64 = 0.9;
-        let is_lower = above_m < self.shape.top_below_m + HIGHER_M;
-        is_lower && self.is_moving_vehicle() && self.shape.whole[1] > WHOLE
     }
 
     /// A size that changed moves the middle away from the sensor, not the edges that it sees.
@@ -189,32 +175,6 @@ impl Track {
         self.moves && self.newness.went(self.motion.standing() > 0.5)
     }
 
-    /// Whether it goes with the sensor as what is met of a rail does: a layer meets it at one
-    /// distance, wherever the sensor is.
-    fn goes_like_a_rail(&self, look: &Look, spots: &[Spot]) -> bool {
-        /// A slower sensor carries nothing.
-        const SLOWEST_MPS: f64 = 2.0;
-        /// Part of the sensor's velocity by which that of a piece may be off: from layer to layer it
-        /// falls back.
-        const OFF: f64 = 0.7;
-        /// A rail or a fence is lower than road users, and thinner than what of them is so long.
-        const HIGHEST_M: f64 = 1.25;
-        const SHORTEST_M: f64 = 0.8;
-        const WIDEST_M: f64 = 0.4;
-        let velocity_mps = self.velocity_mps();
-        let sensor_speed_mps = look.sensor_mps.norm();
-        if sensor_speed_mps < SLOWEST_MPS
-            || (velocity_mps - look.sensor_mps).norm() > OFF * sensor_speed_mps
-            || self.shape.top_m > HIGHEST_M
-            || self.shape.seen_m[0].max(self.shape.seen_m[1]) < SHORTEST_M
-        {
-            return false;
-        }
-        let course_rad = libm::atan2(velocity_mps.y, velocity_mps.x);
-        let [_, across_m] = View::of(look, spots, course_rad).extent_m();
-        across_m < WIDEST_M
-    }
-
     /// How far it must have gone until that says that it moves. The end of what is seen of a wall
     /// moves, too, but not by its length; what shows a lorry's front beside its length is no wall.
     fn telling_way_m(&self) -> f64 {
@@ -245,7 +205,7 @@ impl Track {
             goes_on: self.goes_on,
             roughness_m: self.roughness_m,
             speed_mps: self.speed_mps,
-            moved: self.moves && !self.is_carried && self.travelled_m > self.telling_way_m(),
+            moved: self.moves && self.travelled_m > self.telling_way_m(),
             surely_moves: self.surely_moves(),
             whole_m: (self.shape.whole[0] > 0.3).then_some(length_m),
             wide_m: (self.shape.whole[1] > 0.5).then_some(width_m),
@@ -315,45 +275,6 @@ mod tests {
     }
 
     #[test]
-    fn what_goes_with_the_sensor_like_a_rail_is_none_however_far_it_goes() {
-        // 1.8 m in a few layers, 10 m to the side of a sensor that passes at 20 m/s.
-        let seen = |layers: std::ops::Range<usize>| {
-            scan_of(1800, |column, layer| match column {
-                424..476 if layers.contains(&layer) && column % 4 == 0 => {
-                    (1000.0 / (0.2 * column as f64).to_radians().sin()) as u16
-                }
-                _ => 0,
-            })
-        };
-        let moved_after_a_second = |layers, velocity_mps: Vector2<f64>, sensor_mps| {
-            let scan = seen(layers);
-            let spots = spots_of(&scan);
-            let look = |seconds| Look {
-                sensor_mps,
-                ..Look::at(&spots, &scan, seconds * velocity_mps)
-            };
-            let (mut outline, begin) = (vec![], scan.time());
-            let mut track = Track::new(0, false, &spots, &look(0.0), begin, 0.0, &mut outline);
-            for tenth in 1..=10 {
-                let seconds = 0.1 * f64::from(tenth);
-                let end = begin + Span::from_seconds(seconds);
-                track.measure(&spots, &look(seconds), end, 0.0, &mut outline);
-            }
-            assert!(track.moves && (track.velocity_mps() - velocity_mps).norm() < 2.0);
-            track.qualities().moved
-        };
-        let (along, across) = (Vector2::new(0.0, 20.0), Vector2::new(20.0, 0.0));
-        assert!(!moved_after_a_second(4..5, along, along));
-        assert!(!moved_after_a_second(4..5, along, 1.5 * along));
-        for sensor_mps in [Vector2::zeros(), -along, 5.0 * along] {
-            assert!(moved_after_a_second(4..5, along, sensor_mps));
-        }
-        // The rear of a car ahead, and what is as high as one beside.
-        assert!(moved_after_a_second(4..5, across, across));
-        assert!(moved_after_a_second(4..8, along, along));
-    }
-
-    #[test]
     fn a_lorry_is_known_to_move_before_it_went_its_length_and_a_wall_is_not() {
         let mut lorry = seen(0.0);
         (lorry.shape.seen_m, lorry.shape.top_m) = ([12.0, 2.5], 3.5);
@@ -375,16 +296,5 @@ mod tests {
         car.give_way();
         wall.give_way();
         assert!(wall.existence.is_gone() && !car.existence.is_gone());
-    }
-
-    #[test]
-    fn what_is_known_to_be_higher_may_go_on_above() {
-        let mut lorry = seen(0.0);
-        lorry.shape.front_known = true;
-        (lorry.shape.top_below_m, lorry.shape.whole) = (3.2, [0.0, 0.95]);
-        assert!(lorry.is_moving_vehicle());
-        assert!(lorry.may_be_own(2.4) && !lorry.may_be_own(4.0));
-        lorry.shape.whole = [0.0; 2];
-        assert!(!lorry.may_be_own(2.4));
     }
 }

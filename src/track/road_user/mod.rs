@@ -75,8 +75,6 @@ pub(super) struct Track {
     moves: bool,
     travelled_m: f64,
     newness: Newness,
-    /// Whether its motion may be the sensor's.
-    is_carried: bool,
     is_suspect: bool,
     /// Whether something nearer hides what is beside it.
     is_cut: bool,
@@ -128,7 +126,6 @@ impl Track {
             moves: false,
             travelled_m: 0.0,
             newness: Newness::of(look),
-            is_carried: false,
             is_suspect,
             is_cut: look.is_cut != [false; 2],
             born_m: look.middle_m,
