@@ -166,9 +166,7 @@ struct Columns<'a> {
     /// The leftmost and the rightmost of a group, seen from the sensor, which it does not surround;
     /// of a column, the lowest.
     ends: [&'a Spot; 2],
-    /// Columns that met it.
-    met: u32,
-    /// Those whose topmost return is not of the highest layer, and those of them in which the ray
+    /// Columns whose topmost return is not of the highest layer, and those of them in which the ray
     /// above that return met something at the same distance.
     seen_above: u32,
     going_on: u32,
@@ -183,7 +181,6 @@ impl<'a> Columns<'a> {
         };
         let mut columns = Self {
             ends: [&spots[0]; 2],
-            met: 0,
             seen_above: 0,
             going_on: 0,
         };
@@ -203,7 +200,6 @@ impl<'a> Columns<'a> {
             if is_to_left(lowest, right) {
                 *right = lowest;
             }
-            columns.met += 1;
             if scan.layer(point) + 1 < MAX_LAYERS {
                 columns.seen_above += 1;
                 columns.going_on += u32::from(same_above(scan, point).is_some());

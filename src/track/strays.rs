@@ -137,8 +137,43 @@ fn mark_strays(
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector2;
+
     use super::*;
     use crate::beams::Seen;
+    use crate::cloud::tests::scan_of;
+    use crate::time::Span;
+    use crate::track::look::Look;
+    use crate::track::tests::{spots_of, with_scene};
+
+    #[test]
+    fn only_what_is_known_to_be_a_road_user_gets_returns_of_no_cluster() {
+        // Two columns of a body 20 m away, which are too few for a cluster.
+        let scan = scan_of(1800, |column, layer| match column {
+            100..102 if (6..8).contains(&layer) => 2000,
+            _ => 0,
+        });
+        let own = spots_of(&scan);
+        let look = Look::at(&own, &scan, Vector2::zeros());
+        let (mut outline, mut end) = (vec![], scan.time());
+        let mut track = Track::new(0, false, &own, &look, end, 0.0, &mut outline);
+        for _ in 0..5 {
+            end = end + Span::from_seconds(0.1);
+            track.measure(&own, &look, end, 0.0, &mut outline);
+        }
+        assert!(track.is_confirmed() && track.is_sparse() && !track.has_moved());
+        let strays = |track: &Track| {
+            let (mut strays, mut spots) = (Strays::default(), vec![]);
+            let members = vec![false; scan.len()];
+            with_scene(&scan, |scene| {
+                strays.add(std::slice::from_ref(track), &members, scene, &mut spots);
+            });
+            spots.len()
+        };
+        assert_eq!(strays(&track), 0);
+        track.is_published = true;
+        assert_eq!(strays(&track), own.len());
+    }
 
     #[test]
     fn a_track_is_seen_if_it_has_spots_of_this_revolution() {

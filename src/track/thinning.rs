@@ -32,7 +32,7 @@ struct Column {
 /// Clusters of fewer returns are kept whole: people, and what is far away.
 const MANY: usize = 128;
 /// How far the columns that are kept are apart at most, across the line of sight: two columns at least
-/// show a head.
+/// show what is as narrow as a head.
 const APART_M: f64 = 0.12;
 /// A difference of ranges from which on two returns of a column, one above the other, or the nearest
 /// ones of two columns are kept: there something ends, or leads away from the sensor.

@@ -182,8 +182,7 @@ impl Grouping {
 
     /// Finds the tracks that can have returns of a patch.
     fn find_near(&mut self, number: usize, tracks: &[Track]) {
-        let patches = self.placer.patches();
-        let patch = &patches[number];
+        let patch = &self.placer.patches()[number];
         self.near.clear();
         self.near.extend(self.forecasts.near(patch));
         let forecasts = &self.forecasts;
