@@ -325,7 +325,8 @@ impl Approach {
         if self.is_new {
             begin_s = begin_s.min(left_m / self.fastest_mps);
         }
-        begin_s
+        // However little is known of his speed.
+        begin_s.max(left_m / self.fastest_mps.max(fast_mps))
     }
 }
 

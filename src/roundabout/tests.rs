@@ -197,6 +197,22 @@ fn nothing_is_taken_for_granted_of_newcomers() {
 }
 
 #[test]
+fn nobody_comes_faster_than_anybody_may_however_little_is_known_of_his_speed() {
+    let mut watcher = watcher();
+    let mut seen_askew = round(Class::Car, ROAD_M, 60.0, 0.0);
+    seen_askew.speed_deviation_mps = 5.0;
+    watcher.watch(&situation(&[seen_askew]));
+    let advice = watcher.advice().unwrap();
+    let mut windows = advice.windows.iter();
+    let window = windows.find(|window| Some(window.arm) == advice.own_arm);
+    // More than half of the way round is left.
+    let window = window.unwrap();
+    let fastest_mps = RoundaboutParameters::profile(Profile::Default).speed_mps;
+    let soonest_s = (window.way_m - 6.0) / fastest_mps;
+    assert!(window.begin_s > soonest_s, "{window:?}");
+}
+
+#[test]
 fn nothing_is_said_without_a_map_or_far_from_it() {
     let mut none = Watcher::new(&RoundaboutParameters::profile(Profile::Default));
     none.watch(&situation(&[]));
