@@ -9,6 +9,9 @@ use crate::track::confidence::confidence;
 
 /// An object that is farther than this from where it is said to be is not there.
 const THERE_M: f64 = 2.0;
+/// Standard deviations of its velocity above which something goes by its motion alone, though no ray has shown
+/// yet that its place was empty: with three, a third more of what stands in a real yard seems to move.
+const SURELY_DEVIATIONS: f64 = 5.0;
 
 impl Track {
     /// The existence of a road user, by the track and what it looks like.
@@ -29,7 +32,10 @@ impl Track {
         let (class, class_probability) = self.belief.class();
         let (sine, cosine) = libm::sincos(shape.yaw_rad);
         let ahead = Vector2::new(cosine, sine);
-        let stands = estimate.standing > 0.5 || !self.moves;
+        let deviation_mps = libm::sqrt(0.5 * estimate.velocity_covariance.trace());
+        let surely_goes =
+            self.goes() && estimate.velocity_mps.norm() > SURELY_DEVIATIONS * deviation_mps;
+        let stands = estimate.standing > 0.5 || !(self.moves || surely_goes);
         let moving_mps = if shape.front_known {
             estimate.velocity_mps.dot(&ahead)
         } else {
@@ -66,5 +72,48 @@ impl Track {
             last_measured: self.last_measured,
             points: self.points,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::tests::scan_of;
+    use crate::time::Span;
+    use crate::track::look::Look;
+    use crate::track::tests::spots_of;
+
+    #[test]
+    fn what_goes_beyond_doubt_has_its_speed_though_no_place_of_it_was_seen_empty() {
+        // 4.2 m across the line of sight, 20 m away, and a metre on in each revolution.
+        let met = |revolution: usize| {
+            let columns = 300 + 14 * revolution..360 + 14 * revolution;
+            scan_of(1800, |column, layer| match layer {
+                5..8 if columns.contains(&column) => 2000,
+                _ => 0,
+            })
+        };
+        let speed_mps = |revolutions: usize| {
+            let (mut outline, mut track) = (vec![], None::<Track>);
+            let mut end = met(0).time();
+            for revolution in 0..revolutions {
+                let scan = met(revolution);
+                let spots = spots_of(&scan);
+                let look = Look::at(&spots, &scan, Vector2::zeros());
+                end = end + Span::from_seconds(0.1);
+                match &mut track {
+                    Some(track) => track.measure(&spots, &look, end, 0.0, &mut outline),
+                    None => {
+                        track = Some(Track::new(0, false, &spots, &look, end, 0.0, &mut outline));
+                    }
+                }
+            }
+            let mut track = track.unwrap();
+            track.moves = false;
+            track.object(end).speed_mps.abs()
+        };
+        assert_eq!(speed_mps(2), 0.0);
+        let known_mps = speed_mps(15);
+        assert!((known_mps - 9.8).abs() < 1.5, "{known_mps}");
     }
 }
