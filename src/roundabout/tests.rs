@@ -199,9 +199,9 @@ fn nothing_is_taken_for_granted_of_newcomers() {
 #[test]
 fn nobody_comes_faster_than_anybody_may_however_little_is_known_of_his_speed() {
     let mut watcher = watcher();
-    let mut seen_askew = round(Class::Car, ROAD_M, 60.0, 0.0);
-    seen_askew.speed_deviation_mps = 5.0;
-    watcher.watch(&situation(&[seen_askew]));
+    let mut hardly_known = round(Class::Car, ROAD_M, 60.0, 0.0);
+    hardly_known.speed_deviation_mps = 5.0;
+    watcher.watch(&situation(&[hardly_known]));
     let advice = watcher.advice().unwrap();
     let mut windows = advice.windows.iter();
     let window = windows.find(|window| Some(window.arm) == advice.own_arm);

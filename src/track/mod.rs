@@ -311,9 +311,13 @@ impl Tracker {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector2;
+
+    use super::look::Look;
     use super::spots::Spot;
     use super::*;
     use crate::ground::{Origin, Plane};
+    use crate::time::Span;
 
     /// All returns of a scan, seen by a sensor at the origin.
     pub(super) fn spots_of(scan: &Scan) -> Vec<Spot> {
@@ -325,6 +329,28 @@ mod tests {
             });
             spots.collect()
         })
+    }
+
+    /// A track of what scans show to a sensor at the origin, a tenth of a second after each other, and the time of the
+    /// last one.
+    pub(super) fn followed<'a>(scans: impl IntoIterator<Item = &'a Scan>) -> (Track, Time) {
+        let (mut outline, mut known) = (vec![], None::<(Track, Time)>);
+        for scan in scans {
+            let spots = spots_of(scan);
+            let look = Look::at(&spots, scan, Vector2::zeros());
+            match &mut known {
+                Some((track, end)) => {
+                    *end = *end + Span::from_seconds(0.1);
+                    track.measure(&spots, &look, *end, 0.0, &mut outline);
+                }
+                None => {
+                    let end = scan.time();
+                    let track = Track::new(0, false, &spots, &look, end, 0.0, &mut outline);
+                    known = Some((track, end));
+                }
+            }
+        }
+        known.expect("at least one scan")
     }
 
     /// What is seen by a sensor that stands still, 1.9 m above level ground.

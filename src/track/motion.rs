@@ -41,6 +41,13 @@ pub(super) struct Estimate {
     pub(super) standing: f64,
 }
 
+impl Estimate {
+    /// Standard deviation of the velocity along either axis, in the mean.
+    pub(super) fn velocity_deviation_mps(&self) -> f64 {
+        libm::sqrt(0.5 * self.velocity_covariance.trace())
+    }
+}
+
 impl Motion {
     /// Something seen for the first time, which may move at any speed of `speed_deviation_mps`.
     pub(super) fn new(

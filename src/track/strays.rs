@@ -137,14 +137,10 @@ fn mark_strays(
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector2;
-
     use super::*;
     use crate::beams::Seen;
     use crate::cloud::tests::scan_of;
-    use crate::time::Span;
-    use crate::track::look::Look;
-    use crate::track::tests::{spots_of, with_scene};
+    use crate::track::tests::{followed, spots_of, with_scene};
 
     #[test]
     fn only_what_is_known_to_be_a_road_user_gets_returns_of_no_cluster() {
@@ -154,13 +150,7 @@ mod tests {
             _ => 0,
         });
         let own = spots_of(&scan);
-        let look = Look::at(&own, &scan, Vector2::zeros());
-        let (mut outline, mut end) = (vec![], scan.time());
-        let mut track = Track::new(0, false, &own, &look, end, 0.0, &mut outline);
-        for _ in 0..5 {
-            end = end + Span::from_seconds(0.1);
-            track.measure(&own, &look, end, 0.0, &mut outline);
-        }
+        let (mut track, _) = followed(std::iter::repeat_n(&scan, 6));
         assert!(track.is_confirmed() && track.is_sparse() && !track.has_moved());
         let strays = |track: &Track| {
             let (mut strays, mut spots) = (Strays::default(), vec![]);

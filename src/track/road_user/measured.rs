@@ -93,7 +93,7 @@ impl Track {
     fn steer(&mut self) {
         let estimate = self.motion.estimate();
         let speed_mps = estimate.velocity_mps.norm();
-        let deviation_mps = libm::sqrt(0.5 * estimate.velocity_covariance.trace());
+        let deviation_mps = estimate.velocity_deviation_mps();
         if estimate.standing < 0.3 && speed_mps > MOVING_MPS && speed_mps > 2.0 * deviation_mps {
             let course_rad = libm::atan2(estimate.velocity_mps.y, estimate.velocity_mps.x);
             // What is small turns on the spot; a vehicle must show clearly where it goes.

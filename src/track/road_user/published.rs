@@ -32,9 +32,8 @@ impl Track {
         let (class, class_probability) = self.belief.class();
         let (sine, cosine) = libm::sincos(shape.yaw_rad);
         let ahead = Vector2::new(cosine, sine);
-        let deviation_mps = libm::sqrt(0.5 * estimate.velocity_covariance.trace());
-        let surely_goes =
-            self.goes() && estimate.velocity_mps.norm() > SURELY_DEVIATIONS * deviation_mps;
+        let least_sure_mps = SURELY_DEVIATIONS * estimate.velocity_deviation_mps();
+        let surely_goes = self.goes() && estimate.velocity_mps.norm() > least_sure_mps;
         let stands = estimate.standing > 0.5 || !(self.moves || surely_goes);
         let moving_mps = if shape.front_known {
             estimate.velocity_mps.dot(&ahead)
@@ -77,11 +76,9 @@ impl Track {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::cloud::Scan;
     use crate::cloud::tests::scan_of;
-    use crate::time::Span;
-    use crate::track::look::Look;
-    use crate::track::tests::spots_of;
+    use crate::track::tests::followed;
 
     #[test]
     fn what_goes_beyond_doubt_has_its_speed_though_no_place_of_it_was_seen_empty() {
@@ -94,21 +91,8 @@ mod tests {
             })
         };
         let speed_mps = |revolutions: usize| {
-            let (mut outline, mut track) = (vec![], None::<Track>);
-            let mut end = met(0).time();
-            for revolution in 0..revolutions {
-                let scan = met(revolution);
-                let spots = spots_of(&scan);
-                let look = Look::at(&spots, &scan, Vector2::zeros());
-                end = end + Span::from_seconds(0.1);
-                match &mut track {
-                    Some(track) => track.measure(&spots, &look, end, 0.0, &mut outline),
-                    None => {
-                        track = Some(Track::new(0, false, &spots, &look, end, 0.0, &mut outline));
-                    }
-                }
-            }
-            let mut track = track.unwrap();
+            let scans: Vec<Scan> = (0..revolutions).map(met).collect();
+            let (mut track, end) = followed(&scans);
             track.moves = false;
             track.object(end).speed_mps.abs()
         };

@@ -37,26 +37,15 @@ impl Track {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector2;
-
     use super::*;
     use crate::cloud::Scan;
     use crate::cloud::tests::scan_of;
     use crate::time::Span;
-    use crate::track::look::Look;
-    use crate::track::tests::spots_of;
+    use crate::track::tests::followed;
 
     /// What stands 10 m away and was seen so many times.
-    fn seen(times: u32, scan: &Scan) -> (Track, Time) {
-        let spots = spots_of(scan);
-        let look = Look::at(&spots, scan, Vector2::zeros());
-        let (mut outline, mut end) = (vec![], scan.time());
-        let mut track = Track::new(0, false, &spots, &look, end, 0.0, &mut outline);
-        for _ in 1..times {
-            end = end + Span::from_seconds(0.1);
-            track.measure(&spots, &look, end, 0.0, &mut outline);
-        }
-        (track, end)
+    fn seen(times: usize, scan: &Scan) -> (Track, Time) {
+        followed(std::iter::repeat_n(scan, times))
     }
 
     #[test]

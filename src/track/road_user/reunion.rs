@@ -58,7 +58,7 @@ impl Parting {
             position_m: estimate.position_m,
             velocity_mps: estimate.velocity_mps,
             yaw_rate_radps: estimate.yaw_rate_radps,
-            deviation_mps: libm::sqrt(0.5 * estimate.velocity_covariance.trace()),
+            deviation_mps: estimate.velocity_deviation_mps(),
             standing: estimate.standing,
             points: points as f64,
             at,
