@@ -65,7 +65,7 @@ impl Track {
             let known_m = self.lower_m.get_or_insert(fresh_m);
             *known_m += 0.2 * (fresh_m - *known_m);
         }
-        self.newness.learn(look, self.usual_points);
+        self.newness.learn(look);
         self.trace.push(seen_at, self.motion.estimate().position_m);
         self.note_motion(look);
         if self.parted.is_renewed_by(look.points, seen_at) {
@@ -128,23 +128,18 @@ impl Track {
             self.born_m = estimate.position_m;
             return;
         }
-        if self.moves
-            && self
-                .newness
-                .clings(estimate.standing > 0.5, self.usual_points)
-        {
+        if self.moves && self.newness.clings(estimate.standing > 0.5) {
             (self.moves, self.travelled_m) = (false, 0.0);
             self.born_m = estimate.position_m;
             self.newness.forget_way();
         }
         let is_moving = self.goes();
-        let may_move = self.newness.allows_motion(self.usual_points);
+        let may_move = self.newness.allows_motion();
         let shows_motion =
             self.newness.vacated.is_sure() || self.trails.shows_motion(self.shape.seen_m[0], look);
         if is_moving && may_move && shows_motion {
             self.moves = true;
-            self.newness
-                .note_way(estimate.position_m, self.usual_points);
+            self.newness.note_way(estimate.position_m);
             let travelled_m = (estimate.position_m - self.born_m).norm();
             self.travelled_m = self.travelled_m.max(travelled_m);
         }
@@ -167,7 +162,7 @@ impl Track {
 
     /// Whether it was of late where nothing was before.
     pub(in crate::track) fn is_new(&self) -> bool {
-        self.newness.was_empty(self.usual_points)
+        self.newness.was_empty()
     }
 
     /// Whether it moves for sure, or did and went far: as a whole, and to where nothing was.
