@@ -1,6 +1,6 @@
 //! What a user may set: the parameters of all stages together, and their text form.
 
-#[cfg(feature = "shell")]
+#[cfg(feature = "text")]
 pub mod text;
 
 use crate::cloud::CloudParameters;
