@@ -24,10 +24,12 @@ const FRESH: f64 = 0.2;
 /// Share of returns in places that were empty from which on something moved there, and below which it stands.
 const LEAST_NEW: f64 = 0.6;
 const LEAST_MOVED: f64 = 0.2;
-/// Returns in places that were occupied from which on it stands, however it seems to go, unless it is known to have gone
-/// so far: of who passes close by something there are some, too. With as few as decide whether something begins to
-/// move, cars in a roundabout are lost (HOTA 87.1 instead of 89.2, seeds 611 to 618).
+/// Known returns from which on they say whether it may begin to move.
+const FEWEST_KNOWN: f64 = 2.0;
+/// Returns in places that were occupied from which on what seems to go stands: who passes close by something has some, too.
+/// With [`FEWEST_KNOWN`] the roundabout's HOTA falls from 89.2 to 87.1 (`scripts/evaluate --seeds 611-618 --duration 20`).
 const MANY_OLD: f64 = 8.0;
+/// The way from which on that no longer speaks against its motion.
 const SURE_WAY_M: f64 = 5.0;
 /// Share of the way that counts on after each revolution in which it was where something stood.
 const CLINGING: f64 = 0.8;
@@ -53,9 +55,8 @@ impl Newness {
 
     /// The share of the returns in places that were empty, of those of which that is known; `None` where too few are.
     fn share(&self) -> Option<f64> {
-        const FEWEST: f64 = 2.0;
         let known = self.new + self.old;
-        (known >= FEWEST).then(|| self.new / known)
+        (known >= FEWEST_KNOWN).then(|| self.new / known)
     }
 
     /// Whether it is where nothing was, or nothing is where it was.
@@ -65,7 +66,7 @@ impl Newness {
     }
 
     /// Whether it is where something stood.
-    pub(super) fn was_occupied(&self) -> bool {
+    fn was_occupied(&self) -> bool {
         let share = self.share();
         !self.vacated.is_sure() && share.is_some_and(|share| share < LEAST_MOVED)
     }
