@@ -14,7 +14,7 @@ use crate::publish::{Heading, Publisher};
 use crate::roadmap::{DrivenRoundabout, Roadmap};
 use crate::roundabout::{Advice, Sight, Situation, Watcher};
 use crate::time::Time;
-use crate::track::{Object, Scene, Tracker};
+use crate::track::{APPEARANCE_FEATURES, Object, Scene, Tracker};
 
 pub use crate::fault::{Counts, Fault};
 pub use crate::report::{Outcome, RevolutionReport, Step};
@@ -265,6 +265,11 @@ impl Pipeline {
     /// The last revolution's clusters.
     pub fn clusters(&self) -> &crate::cluster::Clusters {
         self.clusters.clusters()
+    }
+
+    /// What each of the last revolution's clusters looks like ([`Tracker::appearances`]).
+    pub fn appearances(&self) -> impl ExactSizeIterator<Item = [f64; APPEARANCE_FEATURES]> {
+        self.tracker.appearances()
     }
 
     /// The last revolution's objects in the local frame, by id.

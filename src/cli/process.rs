@@ -14,6 +14,7 @@ use super::{Completion, files, map, objects, roads};
 use crate::pipeline::{Fault, Outcome, Pipeline, RevolutionReport};
 use crate::tally::Tally;
 use crate::time::Time;
+use crate::track::APPEARANCE_FEATURES;
 use crate::wire::envelope::Postmark;
 use crate::wire::recording::Entry;
 use crate::wire::{Envelope, Recording};
@@ -32,6 +33,9 @@ pub(super) struct Arguments {
     /// Labels of all points, one array a revolution.
     #[arg(long, value_name = "OUT.npz")]
     labels: Option<PathBuf>,
+    /// What each cluster of the labels looks like, one array a revolution, to fit what tells vehicles that stand.
+    #[arg(long, value_name = "OUT.npz")]
+    appearances: Option<PathBuf>,
     /// The map at the end.
     #[arg(long, value_name = "OUT.npz")]
     grid: Option<PathBuf>,
@@ -65,6 +69,7 @@ struct Process<'a> {
     objects: Option<Output>,
     trajectory: Option<Output>,
     labels: Option<LabelWriter>,
+    appearances: Option<Archive>,
     grid: Option<Archive>,
     score: Option<Score>,
     summary: Option<Summary>,
@@ -81,6 +86,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
         &arguments.output,
         &arguments.objects,
         &arguments.labels,
+        &arguments.appearances,
         &arguments.grid,
         &arguments.trajectory,
     ];
@@ -104,6 +110,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
             .labels
             .as_deref()
             .map(LabelWriter::create)
+            .transpose()?,
+        appearances: arguments
+            .appearances
+            .as_deref()
+            .map(Archive::create)
             .transpose()?,
         grid: arguments.grid.as_deref().map(Archive::create).transpose()?,
         summary: asks_nothing.then(Summary::new),
@@ -188,6 +199,12 @@ impl Process<'_> {
         if let Some(labels) = &mut self.labels {
             labels.put_perceived(&self.pipeline, report.number)?;
         }
+        if let Some(archive) = &mut self.appearances {
+            let all = self.pipeline.appearances();
+            let shape = [all.len(), APPEARANCE_FEATURES];
+            let features = all.flatten().map(|feature| feature as f32);
+            archive.put(&format!("r{:06}", report.number), &shape, features)?;
+        }
         Ok(())
     }
 
@@ -222,6 +239,9 @@ impl Process<'_> {
         }
         if let Some(labels) = self.labels {
             labels.finish()?;
+        }
+        if let Some(archive) = self.appearances {
+            archive.finish()?;
         }
         if let Some(archive) = self.grid {
             map::write(archive, self.pipeline.grid())?;

@@ -201,6 +201,17 @@ impl Scenery {
         self.drum(at_m, crown_m, [2.3, 6.5], Fabric::Leaves(0.8), 0.4)
     }
 
+    /// A clump of twigs and leaves: rays end within, after a mean way.
+    pub(super) fn clump(
+        &mut self,
+        at_m: [f64; 2],
+        radius_m: f64,
+        heights_m: [f64; 2],
+        mean_way_m: f64,
+    ) -> &mut Self {
+        self.drum(at_m, radius_m, heights_m, Fabric::Leaves(mean_way_m), 0.4)
+    }
+
     /// A sign on two posts.
     pub(super) fn sign(&mut self, at_m: [f64; 2], yaw_deg: f64) -> &mut Self {
         self.bar(at_m, yaw_deg, [0.9, 0.03], [1.9, 2.7], Fabric::Dense, 0.9);
@@ -242,10 +253,22 @@ impl Scenery {
 
     /// Grass: rays end a little above or within it.
     pub(super) fn verge(&mut self, at_m: [f64; 2], yaw_deg: f64, sizes_m: [f64; 2]) -> &mut Self {
+        self.grass(at_m, yaw_deg, sizes_m, 0.14, 0.4)
+    }
+
+    /// Grass of a height, in which rays end after a mean way.
+    pub(super) fn grass(
+        &mut self,
+        at_m: [f64; 2],
+        yaw_deg: f64,
+        sizes_m: [f64; 2],
+        high_m: f64,
+        mean_way_m: f64,
+    ) -> &mut Self {
         let (u, v) = (0.5 * sizes_m[0], 0.5 * sizes_m[1]);
         let solid = Solid {
-            shape: block([-u, -v, -ROOT_M], [u, v, 0.14]),
-            fabric: Fabric::Leaves(0.4),
+            shape: block([-u, -v, -ROOT_M], [u, v, high_m]),
+            fabric: Fabric::Leaves(mean_way_m),
             reflectance: 0.4,
         };
         self.put(at_m, yaw_deg, solid, true);

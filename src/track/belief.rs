@@ -252,6 +252,19 @@ impl Belief {
         self.structure += share * (fresh.structure - self.structure);
     }
 
+    /// The same of what is known to be a vehicle.
+    pub(super) fn of_vehicle(&self) -> Self {
+        let [car, _, _, large] = self.road_users;
+        let mut belief = Self {
+            // Of what looks like none, cars are the most frequent.
+            road_users: [car.max(f64::MIN_POSITIVE), 0.0, 0.0, large],
+            other: 0.0,
+            structure: 0.0,
+        };
+        belief.normalise();
+        belief
+    }
+
     /// Probability that it is a road user of any class.
     pub(super) fn road_user(&self) -> f64 {
         1.0 - self.structure

@@ -9,8 +9,8 @@
 //! `view` of it in the road user's own axes, its `motion`, its `shape`, its `class`, of which there
 //! is a `belief`, and by its `trail` whether it moves; `existence` says whether it is there at all, and
 //! `confidence` how often that is right; what stands and is hardly a road user rests most of the
-//! time, and one that was lost gets its id back (`road_user`). `nearest` is the tracking of the
-//! thesis.
+//! time, and one that was lost gets its id back (`road_user`). Vehicles that are `standing` are known by
+//! the looks of their clusters and by their places. `nearest` is the tracking of the thesis.
 
 mod above;
 
@@ -64,6 +64,8 @@ mod sight;
 
 mod spots;
 
+mod standing;
+
 mod strays;
 
 mod thinning;
@@ -75,6 +77,7 @@ mod trail;
 mod view;
 
 pub use class::Class;
+pub use standing::FEATURES as APPEARANCE_FEATURES;
 
 use crate::beams::Beams;
 use crate::cloud::Scan;
@@ -275,6 +278,12 @@ impl Tracker {
                 .expect(end, &sweep.sensor, is_meant, &mut self.expected);
         }
         &self.expected
+    }
+
+    /// What each cluster of the last revolution looks like: [`APPEARANCE_FEATURES`] numbers a cluster, all
+    /// zero for those of less than five returns; of no meaning but to fit what tells vehicles that stand.
+    pub fn appearances(&self) -> impl ExactSizeIterator<Item = [f64; APPEARANCE_FEATURES]> {
+        self.by_object.appearances()
     }
 
     /// Takes the clusters of a revolution in.

@@ -11,6 +11,7 @@ use super::nearby::Discs;
 use super::road_user::Track;
 use super::sight::Sight;
 use super::spots::Spot;
+use super::standing::{FEATURES, Standing};
 use super::{Object, Scene, TrackParameters};
 use crate::cluster::Clusters;
 use crate::ego::{Pose, wrapped_rad};
@@ -21,12 +22,15 @@ use crate::time::{Span, Time};
 #[derive(Debug, Clone, Default)]
 pub(super) struct ObjectTracker {
     next_id: u32,
+    /// How many tracks there ever were.
+    born: u32,
     /// How many revolutions there were.
     revolution: u32,
     tracks: Vec<Track>,
     /// Of which nothing was left, but which may be seen again.
     lost: Vec<Track>,
     objects: Vec<Object>,
+    standing: Standing,
     grouping: Grouping,
     outline: Vec<[f64; 2]>,
     candidates: Vec<Candidate>,
@@ -57,11 +61,17 @@ impl ObjectTracker {
     pub(super) fn reset(&mut self) {
         self.tracks.clear();
         self.lost.clear();
+        self.standing.reset();
         self.objects.clear();
     }
 
     pub(super) fn objects(&self) -> &[Object] {
         &self.objects
+    }
+
+    /// What each cluster of the last revolution looks like.
+    pub(super) fn appearances(&self) -> impl ExactSizeIterator<Item = [f64; FEATURES]> {
+        self.standing.appearances()
     }
 
     /// Adds the boxes of those that are meant, as they will be at a time, seen from the sensor.
@@ -92,6 +102,7 @@ impl ObjectTracker {
         let (old, new) = (from.placement(), to.placement());
         let turn_rad = wrapped_rad(to.yaw_rad - from.yaw_rad);
         let rise_m = to.position_m[2] - from.position_m[2];
+        self.standing.reframe(from, to);
         for track in self.tracks.iter_mut().chain(&mut self.lost) {
             track.reframe(turn_rad, |at| new.local_m(old.sensor_m(at)), rise_m);
         }
@@ -116,6 +127,7 @@ impl ObjectTracker {
         self.update(scene, end);
         self.begin(scene, end, origin_m, parameters);
         self.tidy(end, parameters);
+        self.standing.process(clusters, scene, parameters);
         self.publish(end, parameters);
     }
 
@@ -255,7 +267,8 @@ impl ObjectTracker {
                 &mut self.outline,
             );
             self.next_id = self.next_id.wrapping_add(1);
-            self.tracks.push(track);
+            self.tracks.push(track.taking_turns(self.born));
+            self.born = self.born.wrapping_add(1);
         }
     }
 
@@ -314,11 +327,20 @@ impl ObjectTracker {
             }
             number += 1;
         }
-        let may_be = |track: &&Track| track.is_published && track.most_confidence() >= least;
-        let objects = self.tracks.iter().filter(may_be);
-        let objects = objects.map(|track| track.object(end));
-        let listed = objects.filter(|object| object.existence >= least);
-        self.objects.extend(listed);
+        self.standing.give_way(&mut self.tracks);
+        for track in &mut self.tracks {
+            let may_be = track.is_published && !track.is_left_standing();
+            if may_be && track.most_confidence() >= least {
+                let object = track.object(end);
+                if object.existence >= least {
+                    track.is_listed = true;
+                    self.objects.push(object);
+                }
+            }
+        }
+        let (tracks, objects) = (&mut self.tracks, &mut self.objects);
+        self.standing
+            .list(end, least, tracks, &mut self.next_id, objects);
         self.objects.sort_by_key(|object| object.id);
     }
 
@@ -353,7 +375,7 @@ impl ObjectTracker {
 }
 
 /// Height of the ground below a group in the local frame.
-fn floor_z_m(spots: &[Spot], scene: &Scene<'_>) -> f64 {
+pub(super) fn floor_z_m(spots: &[Spot], scene: &Scene<'_>) -> f64 {
     let lowest = spots.iter().min_by(|a, b| a.above_m.total_cmp(&b.above_m));
     let z_m = lowest.map_or(0.0, |spot| {
         f64::from(scene.scan.z_m()[spot.point as usize] - spot.above_m)
@@ -583,7 +605,7 @@ mod tests {
         let [of_one, .., of_both]: &[Vec<u32>] = &ids[..] else {
             panic!("{ids:?}");
         };
-        assert_eq!((&of_one[..], &of_both[..]), (&[0][..], &[1, 2][..]));
+        assert_eq!((&of_one[..], &of_both[..]), (&[0][..], &[2, 3][..]));
     }
 
     /// A track that was seen once.

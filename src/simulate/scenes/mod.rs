@@ -1,5 +1,6 @@
 //! The scenes themselves. Traffic drives on the right; x is east, y north.
 
+mod overgrown;
 mod passage;
 mod places;
 mod roads;
@@ -100,6 +101,13 @@ pub(super) const ALL: &[Scenario] = &[
         name: "furniture",
         summary: "the same without any road user: vegetation and street furniture",
         build: strangers::furniture,
+        roads: None,
+    },
+    Scenario {
+        name: "overgrown",
+        summary: "a street that chance furnishes, too, among gardens: ragged trees, thickets and fronts \
+                  close behind parked vehicles and above them",
+        build: overgrown::overgrown,
         roads: None,
     },
 ];

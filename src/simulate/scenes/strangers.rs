@@ -29,12 +29,12 @@ pub(super) fn furniture(random: &mut Random) -> Scene {
 }
 
 /// Something between two bounds, all of it alike.
-fn between(random: &mut Random, low: f64, high: f64) -> f64 {
+pub(super) fn between(random: &mut Random, low: f64, high: f64) -> f64 {
     low + (high - low) * random.uniform()
 }
 
 /// Which of so many shares chance picks; none if it lies beyond them all.
-fn pick(random: &mut Random, shares: &[f64]) -> Option<usize> {
+pub(super) fn pick(random: &mut Random, shares: &[f64]) -> Option<usize> {
     let mut left = random.uniform();
     shares.iter().position(|share| {
         left -= share;
@@ -143,7 +143,7 @@ fn lorry(random: &mut Random) -> Variant {
     Variant { reflectance, ..own }
 }
 
-fn parked(random: &mut Random, [x, y]: [f64; 2]) -> Actor {
+pub(super) fn parked(random: &mut Random, [x, y]: [f64; 2]) -> Actor {
     let (variant, y) = match pick(random, &[0.8, 0.12, 0.03]) {
         Some(0) => (Variant::car(random), y),
         Some(1) => (lorry(random), y + 3.0),
@@ -179,7 +179,7 @@ fn person(random: &mut Random) -> Variant {
     }
 }
 
-fn stand_at_kerb(random: &mut Random, scenery: &mut Scenery, [x, y]: [f64; 2]) {
+pub(super) fn stand_at_kerb(random: &mut Random, scenery: &mut Scenery, [x, y]: [f64; 2]) {
     let turn_deg = between(random, 0.0, 180.0);
     match pick(random, &[0.12, 0.12, 0.1, 0.06, 0.06, 0.08, 0.05]) {
         Some(0) => {
@@ -307,7 +307,7 @@ fn stand_far(random: &mut Random, scenery: &mut Scenery, [x, y]: [f64; 2]) {
 }
 
 /// Vehicles ahead and behind in the lane, as fast as the sensor's: a queue, or traffic that flows.
-fn add_column(random: &mut Random, actors: &mut Vec<Actor>, speed_mps: f64) {
+pub(super) fn add_column(random: &mut Random, actors: &mut Vec<Actor>, speed_mps: f64) {
     for direction in [1.0, -1.0] {
         let mut along_m = between(random, 7.0, 30.0);
         for _ in 0..random.below(4) {

@@ -240,6 +240,13 @@ mod tests {
         track
     }
 
+    impl Track {
+        /// Has it moved, whatever was seen of it.
+        pub(in crate::track) fn moves_for_tests(&mut self) {
+            self.moves = true;
+        }
+    }
+
     #[test]
     fn a_wall_does_not_move_whatever_the_piece_of_it_that_is_seen_does() {
         assert!(seen(0.0).moves);

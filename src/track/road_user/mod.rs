@@ -18,6 +18,7 @@ mod vacated;
 
 use super::TrackParameters;
 use super::belief::Belief;
+use super::class::Class;
 use super::existence::Existence;
 use super::look::Look;
 use super::motion::Motion;
@@ -91,10 +92,16 @@ pub(super) struct Track {
     floor_z_m: f64,
     /// Where and how fast it was when it was last seen clearly.
     parted: Parting,
-    /// Whether others know its id.
+    /// Whether it was likely enough once to be listed.
     pub(super) is_published: bool,
+    /// Whether others know its id.
+    pub(super) is_listed: bool,
     /// Whether it is not looked at now.
     rests: bool,
+    /// In which of the revolutions it is looked at while it rests.
+    turn: u32,
+    /// The probability that it is a vehicle, if it is only followed as one that stands.
+    standing_vehicle: Option<f64>,
 }
 
 impl Track {
@@ -139,7 +146,10 @@ impl Track {
             floor_z_m,
             parted: Parting::default(),
             is_published: false,
+            is_listed: false,
             rests: false,
+            turn: 0,
+            standing_vehicle: None,
         };
         track.belief = Belief::of(&track.qualities());
         let view = View::of(look, spots, track.shape.yaw_rad);
@@ -154,6 +164,20 @@ impl Track {
         track.motion = Motion::new(centre_m, noise, birth_mps);
         track.parted = Parting::of(&track.motion.estimate(), look.points, time);
         track
+    }
+
+    /// From here on it is a vehicle that stands, with a probability.
+    pub(super) fn stand_as_vehicle(&mut self, probability: f64) {
+        self.standing_vehicle = Some(probability);
+        self.belief = self.belief.of_vehicle();
+        self.motion.halt();
+        (self.moves, self.travelled_m) = (false, 0.0);
+    }
+
+    /// Whether it is a vehicle that stands, which is known by its place.
+    pub(super) fn is_left_standing(&self) -> bool {
+        let is_vehicle = matches!(self.belief.class().0, Class::Car | Class::LargeVehicle);
+        is_vehicle && !self.goes_beyond_doubt()
     }
 
     /// Carries the object on to a time.

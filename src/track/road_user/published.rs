@@ -14,14 +14,24 @@ const THERE_M: f64 = 2.0;
 const SURELY_DEVIATIONS: f64 = 5.0;
 
 impl Track {
-    /// The existence of a road user, by the track and what it looks like.
-    fn road_user_existence(&self) -> f64 {
-        self.existence.probability() * self.belief.road_user()
+    /// The existence of a road user, by the track and what it looks like, given how likely it is where
+    /// it is said to be.
+    fn road_user_existence(&self, there: f64) -> f64 {
+        let road_user = self.belief.road_user();
+        let probability = self.standing_vehicle.unwrap_or(road_user);
+        confidence(self.existence.probability() * probability * there)
+    }
+
+    /// Whether it moves: by what rays have shown, or by its motion alone.
+    pub(in crate::track) fn goes_beyond_doubt(&self) -> bool {
+        let estimate = self.motion.estimate();
+        let least_sure_mps = SURELY_DEVIATIONS * estimate.velocity_deviation_mps();
+        self.moves || (self.goes() && estimate.velocity_mps.norm() > least_sure_mps)
     }
 
     /// How likely it exists at most, wherever it is: never less than [`Object::existence`].
     pub(in crate::track) fn most_confidence(&self) -> f64 {
-        confidence(self.road_user_existence())
+        self.road_user_existence(1.0)
     }
 
     /// What is published, valid at `end`.
@@ -32,9 +42,7 @@ impl Track {
         let (class, class_probability) = self.belief.class();
         let (sine, cosine) = libm::sincos(shape.yaw_rad);
         let ahead = Vector2::new(cosine, sine);
-        let least_sure_mps = SURELY_DEVIATIONS * estimate.velocity_deviation_mps();
-        let surely_goes = self.goes() && estimate.velocity_mps.norm() > least_sure_mps;
-        let stands = estimate.standing > 0.5 || !(self.moves || surely_goes);
+        let stands = estimate.standing > 0.5 || !self.goes_beyond_doubt();
         let moving_mps = if shape.front_known {
             estimate.velocity_mps.dot(&ahead)
         } else {
@@ -65,7 +73,7 @@ impl Track {
                 .map(|axis| libm::sqrt(estimate.position_covariance[(axis, axis)])),
             yaw_deviation_rad: libm::sqrt(shape.yaw_variance),
             speed_deviation_mps: libm::sqrt(speed_variance),
-            existence: confidence(self.road_user_existence() * there),
+            existence: self.road_user_existence(there),
             first_seen: self.first_seen,
             seen_since: self.seen_since,
             last_measured: self.last_measured,

@@ -13,10 +13,15 @@ const TURNS: u32 = 3;
 const LONGEST_S: f64 = 0.32;
 
 impl Track {
+    /// Gives it a turn: tracks that were born one after the other rest in different revolutions.
+    pub(in crate::track) fn taking_turns(self, turn: u32) -> Self {
+        Self { turn, ..self }
+    }
+
     /// Lets it rest in the revolution with this number, or not; they take turns, so that all
     /// revolutions cost alike.
     pub(in crate::track) fn rest(&mut self, revolution: u32, end: Time, least_confidence: f64) {
-        let is_due = self.id.wrapping_add(revolution).is_multiple_of(TURNS)
+        let is_due = self.turn.wrapping_add(revolution).is_multiple_of(TURNS)
             || (end - self.last_measured).seconds() > LONGEST_S;
         self.rests = !is_due && self.may_rest(end, least_confidence);
     }

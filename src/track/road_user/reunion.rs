@@ -253,7 +253,7 @@ impl Track {
             self.parted = Parting::of(&self.motion.estimate(), self.points, self.time);
             self.moves = true;
         }
-        self.id = lost.id;
+        (self.id, self.turn) = (lost.id, lost.turn);
         self.first_seen = lost.first_seen;
         if lost.belief.road_user() > self.belief.road_user() {
             self.belief = lost.belief;

@@ -1,0 +1,348 @@
+//! What a cluster looks like in one revolution, in a dozen numbers that tell vehicles from the rest.
+
+use super::weights::{BIAS, HIDDEN};
+use crate::cloud::MAX_LAYERS;
+use crate::geometry::{Rectangle, turned};
+use crate::track::Scene;
+
+/// How many numbers tell what a cluster looks like.
+pub const FEATURES: usize = 12;
+
+/// What one cluster looks like.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Appearance {
+    pub(super) features: [f64; FEATURES],
+    /// Mean of its returns in the sensor frame.
+    pub(super) middle_m: [f64; 2],
+}
+
+/// Looks at clusters. Its buffers are made once.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Eye {
+    places_m: Vec<[f64; 2]>,
+    depths_m: Vec<f64>,
+    beyond_m: Vec<f64>,
+    jumps_m: Vec<f64>,
+}
+
+/// Fewer returns look like anything.
+pub(super) const FEWEST_RETURNS: usize = 5;
+/// What is nearer than a top by more hides what is above it.
+const OCCLUDER_M: f64 = 0.7;
+/// Of what is above a cluster, what stands within this distance of it may be a part of it.
+const ABOVE_M: f64 = 2.0;
+/// A larger jump between neighbours is one between two surfaces.
+const EDGE_M: f32 = 0.6;
+/// Fewer jumps say nothing of a surface, and most are as smooth as this.
+const FEWEST_JUMPS: usize = 4;
+const SMOOTH_M: f64 = 0.03;
+/// Nothing is told apart above this height, and farther behind or before than that.
+const HIGHEST_M: f64 = 6.0;
+const BEYOND_M: [f64; 2] = [-3.0, 10.0];
+
+impl Eye {
+    /// Looks at a cluster, given its points in array order; `None` if they are too few.
+    pub(super) fn look(&mut self, points: &[u32], scene: &Scene<'_>) -> Option<Appearance> {
+        if points.len() < FEWEST_RETURNS {
+            return None;
+        }
+        let scan = scene.scan;
+        let place_m =
+            |point: u32| [scan.x_m(), scan.y_m()].map(|axis| f64::from(axis[point as usize]));
+        self.places_m.clear();
+        self.places_m
+            .extend(points.iter().map(|point| place_m(*point)));
+        let count = points.len() as f64;
+        let sum_m = self
+            .places_m
+            .iter()
+            .fold([0.0; 2], |sum, [x, y]| [sum[0] + x, sum[1] + y]);
+        let rectangle = Rectangle::fit(&self.places_m, None);
+        let (columns, above_m) = self.look_at_columns(points, scene);
+        self.look_at_surface(points, scene);
+        let mut range_m = 0.0;
+        let (mut top, mut floor_m) = (points[0], f32::INFINITY);
+        for (point, [x, y]) in points.iter().zip(&self.places_m) {
+            range_m += libm::hypot(*x, *y) / count;
+            let height_m = scene.heights_m[*point as usize];
+            floor_m = floor_m.min(height_m);
+            if height_m > scene.heights_m[top as usize] {
+                top = *point;
+            }
+        }
+        let roughness_m = if self.jumps_m.len() < FEWEST_JUMPS {
+            SMOOTH_M
+        } else {
+            median(&mut self.jumps_m)
+        };
+        Some(Appearance {
+            features: [
+                libm::log(range_m + 1.0),
+                libm::log(rectangle.length_m + 0.1),
+                libm::log(rectangle.width_m + 0.1),
+                f64::from(scene.heights_m[top as usize]),
+                passed_m(top as usize, range_m, scene).min(HIGHEST_M),
+                f64::from(floor_m),
+                libm::log(f64::from(columns)),
+                above_m.min(HIGHEST_M),
+                libm::log(roughness_m + 0.01),
+                libm::log(median(&mut self.depths_m) + 0.02),
+                libm::log(mean_off_edge_m(&self.places_m, &rectangle) + 0.02),
+                median(&mut self.beyond_m).clamp(BEYOND_M[0], BEYOND_M[1]),
+            ],
+            middle_m: sum_m.map(|sum_m| sum_m / count),
+        })
+    }
+
+    /// Goes through a cluster column by column: how deep each is, and how far behind its top the next
+    /// ray above ends. Gives how many columns there are, and up to which height something stands above
+    /// one of them, 0 for nothing.
+    fn look_at_columns(&mut self, points: &[u32], scene: &Scene<'_>) -> (u32, f64) {
+        let scan = scene.scan;
+        let (ranges_m, xs_m, ys_m) = (scan.range_m(), scan.x_m(), scan.y_m());
+        let level_m = |point: usize| libm::hypot(f64::from(xs_m[point]), f64::from(ys_m[point]));
+        self.depths_m.clear();
+        self.beyond_m.clear();
+        let (mut columns, mut highest_m) = (0, 0.0f64);
+        for column in points.chunk_by(|a, b| scan.column(*a as usize) == scan.column(*b as usize)) {
+            columns += 1;
+            let top = column[column.len() - 1] as usize;
+            let top_m = level_m(top);
+            if column.len() > 1 {
+                let count = column.len() as f64;
+                let (sum_m, squares) = column.iter().fold((0.0, 0.0), |(sum_m, squares), point| {
+                    let metres = level_m(*point as usize);
+                    (sum_m + metres, squares + metres * metres)
+                });
+                let mean_m = sum_m / count;
+                let variance = (squares / count - mean_m * mean_m).max(0.0);
+                self.depths_m.push(libm::sqrt(variance));
+            }
+            let higher = top + 1..top + MAX_LAYERS - scan.layer(top);
+            if let Some(next) = higher.clone().next() {
+                self.beyond_m.push(if ranges_m[next] > 0.0 {
+                    level_m(next) - top_m
+                } else {
+                    f64::INFINITY
+                });
+            }
+            for above in higher {
+                if ranges_m[above] > 0.0 && (level_m(above) - top_m).abs() < ABOVE_M {
+                    highest_m = highest_m.max(f64::from(scene.heights_m[above]));
+                }
+            }
+        }
+        (columns, highest_m)
+    }
+
+    /// Notes by how much the ranges of neighbours in a layer jump to and fro.
+    fn look_at_surface(&mut self, points: &[u32], scene: &Scene<'_>) {
+        let scan = scene.scan;
+        let ranges_m = scan.range_m();
+        self.jumps_m.clear();
+        for point in points.iter().map(|point| *point as usize) {
+            let (column, layer) = (scan.column(point), scan.layer(point));
+            let [before_m, after_m] = [column + scan.columns() - 1, column + 1]
+                .map(|beside| ranges_m[scan.index(scan.over_seam(beside), layer)]);
+            let here_m = ranges_m[point];
+            let is_near = |other_m: f32| other_m > 0.0 && (other_m - here_m).abs() < EDGE_M;
+            if is_near(before_m) && is_near(after_m) {
+                let jump_m = 0.5 * (before_m + after_m - 2.0 * here_m).abs();
+                self.jumps_m.push(f64::from(jump_m));
+            }
+        }
+    }
+}
+
+impl Appearance {
+    /// Logarithm of the odds that this is a vehicle, had as many been vehicles as where the network
+    /// was fitted.
+    pub(super) fn vehicle_log_odds(&self) -> f64 {
+        HIDDEN.iter().fold(BIAS, |sum, (weights, bias, share)| {
+            let products = weights.iter().zip(self.features);
+            let inner: f64 = products.map(|(weight, feature)| weight * feature).sum();
+            sum + share * libm::tanh(inner + bias)
+        })
+    }
+}
+
+/// Height at which the next ray passed over the top of a cluster; infinite where something hides that,
+/// or no ray is higher.
+fn passed_m(top: usize, range_m: f64, scene: &Scene<'_>) -> f64 {
+    let scan = scene.scan;
+    let layer = scan.layer(top);
+    if layer + 1 == MAX_LAYERS {
+        return f64::INFINITY;
+    }
+    let [own_m, above_m] = [top, top + 1].map(|point| f64::from(scan.range_m()[point]));
+    if above_m > 0.0 && above_m < own_m - OCCLUDER_M {
+        return f64::INFINITY;
+    }
+    let rise = scan.slope(layer + 1).0 - scan.slope(layer).0;
+    f64::from(scene.heights_m[top]) + range_m * rise
+}
+
+/// How far places lie from the nearest edge of the box around them, on average: on a vehicle's sides
+/// they lie along two edges, in a bush anywhere.
+fn mean_off_edge_m(places_m: &[[f64; 2]], rectangle: &Rectangle) -> f64 {
+    let (sine, cosine) = libm::sincos(rectangle.yaw_rad);
+    let middle = turned(&rectangle.centre_m, sine, cosine);
+    let half_m = [0.5 * rectangle.length_m, 0.5 * rectangle.width_m];
+    let off_m = places_m.iter().map(|place_m| {
+        let at = turned(place_m, sine, cosine);
+        let [along_m, across_m] = [0, 1].map(|axis| half_m[axis] - (at[axis] - middle[axis]).abs());
+        along_m.min(across_m)
+    });
+    off_m.sum::<f64>() / places_m.len() as f64
+}
+
+/// The upper median; 0 of nothing.
+fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::cloud::Scan;
+    use crate::cloud::tests::scan_of;
+    use crate::track::tests::with_scene;
+
+    /// Upright walls around a place: where from the sensor, how far they reach to the right and ahead,
+    /// and from which height above the ground to which.
+    #[derive(Clone, Copy)]
+    pub(in crate::track::standing) struct Block {
+        pub(in crate::track::standing) middle_m: [f64; 2],
+        pub(in crate::track::standing) sides_m: [f64; 2],
+        pub(in crate::track::standing) heights_m: [f64; 2],
+    }
+
+    /// A car 7 m ahead and 5 m to the right, or what else has such sizes.
+    pub(in crate::track::standing) const CAR: [Block; 2] = [
+        Block {
+            middle_m: [5.0, 7.0],
+            sides_m: [1.75, 4.3],
+            heights_m: [0.2, 0.9],
+        },
+        Block {
+            middle_m: [5.0, 6.8],
+            sides_m: [1.4, 2.4],
+            heights_m: [0.9, 1.5],
+        },
+    ];
+
+    /// What a sensor 1.9 m above the ground sees of some blocks.
+    pub(in crate::track::standing) fn scan_of_blocks(blocks: &[Block]) -> Scan {
+        scan_of(1800, |column, layer| {
+            let azimuth_rad = (0.2 * column as f64).to_radians();
+            let elevation_rad = (2.0 * layer as f64 - 15.0).to_radians();
+            let direction = [azimuth_rad.sin(), azimuth_rad.cos()];
+            let near_m = |block: &Block| {
+                let (mut enter_m, mut leave_m) = (0.0f64, f64::MAX);
+                for (axis, rate) in direction.into_iter().enumerate() {
+                    let half_m = 0.5 * block.sides_m[axis];
+                    let ends_m =
+                        [-half_m, half_m].map(|end_m| (block.middle_m[axis] + end_m) / rate);
+                    enter_m = enter_m.max(ends_m[0].min(ends_m[1]));
+                    leave_m = leave_m.min(ends_m[0].max(ends_m[1]));
+                }
+                let [low_m, high_m] = block.heights_m;
+                let height_m = 1.9 + enter_m * elevation_rad.tan();
+                let is_met = enter_m < leave_m && (low_m..high_m).contains(&height_m);
+                is_met.then_some(enter_m / elevation_rad.cos())
+            };
+            let nearest_m = blocks.iter().filter_map(near_m).reduce(f64::min);
+            nearest_m.map_or(0, |metres| (100.0 * metres) as u16)
+        })
+    }
+
+    pub(in crate::track::standing) fn points(scan: &Scan) -> Vec<u32> {
+        let all = 0..scan.len() as u32;
+        all.filter(|point| scan.has_return(*point as usize))
+            .collect()
+    }
+
+    fn look(scan: &Scan) -> Appearance {
+        let points = points(scan);
+        let appearance = with_scene(scan, |scene| Eye::default().look(&points, scene));
+        appearance.expect("enough returns")
+    }
+
+    #[test]
+    fn sizes_heights_and_what_the_rays_above_meet_are_told() {
+        let car = look(&scan_of_blocks(&CAR));
+        let [
+            range,
+            long,
+            short,
+            top_m,
+            passed_m,
+            floor_m,
+            _,
+            above_m,
+            _,
+            _,
+            _,
+            beyond_m,
+        ] = car.features;
+        let about = |value: f64, expected: f64| (value - expected).abs() < 0.2;
+        assert!(about(range.exp() - 1.0, 7.5), "{car:?}");
+        assert!(
+            about(long.exp() - 0.1, 4.3) && about(short.exp() - 0.1, 1.75),
+            "{car:?}"
+        );
+        assert!(
+            about(top_m, 1.4) && about(passed_m, 1.7) && about(floor_m, 0.3),
+            "{car:?}"
+        );
+        assert_eq!((above_m, beyond_m), (0.0, 10.0));
+        assert!(
+            about(car.middle_m[0], 4.5) && about(car.middle_m[1], 5.9),
+            "{car:?}"
+        );
+    }
+
+    #[test]
+    fn what_hangs_over_a_cluster_is_seen_within_two_metres_behind_it_only() {
+        let above_m = |behind_cm: u16| {
+            let scan = scan_of(1800, |column, layer| match (column, layer) {
+                (100..140, 4..7) => 1000,
+                (100..140, 10..12) => 1000 + behind_cm,
+                _ => 0,
+            });
+            let mut cluster = points(&scan);
+            cluster.retain(|point| scan.layer(*point as usize) < 7);
+            let seen = with_scene(&scan, |scene| Eye::default().look(&cluster, scene));
+            seen.map(|appearance| appearance.features[7])
+        };
+        assert!(above_m(150).is_some_and(|above_m| (above_m - 3.3).abs() < 0.2));
+        assert_eq!(above_m(250), Some(0.0));
+    }
+
+    #[test]
+    fn a_car_looks_like_a_vehicle_and_a_wall_a_post_and_a_person_do_not() {
+        let odds = |blocks: &[Block]| look(&scan_of_blocks(blocks)).vehicle_log_odds();
+        assert!(odds(&CAR) > 0.5, "{}", odds(&CAR));
+        for (sides_m, high_m) in [([0.3, 12.0], 2.4), ([0.3, 0.3], 2.4), ([0.6, 0.4], 1.8)] {
+            let other = Block {
+                sides_m,
+                heights_m: [0.1, high_m],
+                ..CAR[0]
+            };
+            assert!(odds(&[other]) < -1.0, "{sides_m:?} {}", odds(&[other]));
+        }
+    }
+
+    #[test]
+    fn a_few_returns_look_like_nothing() {
+        let scan = scan_of(1800, |column, layer| {
+            u16::from(layer == 7 && column < 4) * 1000
+        });
+        let seen = with_scene(&scan, |scene| Eye::default().look(&points(&scan), scene));
+        assert_eq!(seen, None);
+    }
+}

@@ -1,0 +1,148 @@
+//! What stands and may be a vehicle: a place, and what was seen there so far.
+
+use nalgebra::Vector2;
+
+use super::appearance::FEWEST_RETURNS;
+use crate::geometry::Rectangle;
+use crate::time::Time;
+use crate::track::TrackParameters;
+use crate::track::look::Look;
+use crate::track::road_user::Track;
+use crate::track::sight::Sight;
+use crate::track::spots::Spot;
+
+/// A cluster of one revolution that may belong to a candidate.
+#[derive(Debug, Clone)]
+pub(super) struct Sighting {
+    /// Its returns, in the list of all of them.
+    pub(super) spots: std::ops::Range<usize>,
+    pub(super) look: Look,
+    /// Logarithm of the odds that it is a vehicle, by what it looks like alone.
+    pub(super) log_odds: f64,
+}
+
+/// What may be a vehicle that stands.
+#[derive(Debug, Clone)]
+pub(super) struct Candidate {
+    pub(super) track: Track,
+    /// Mean of what it looked like of late.
+    log_odds: f64,
+    looks: u32,
+    /// Whether rays passed through its place when it was looked at last.
+    is_empty: bool,
+    /// Middle of the last look, and how far it went from look to look of late.
+    middle_m: Vector2<f64>,
+    step_m: Vector2<f64>,
+}
+
+/// Looks that the mean reaches back: later ones are mostly nearer.
+const REACH: f64 = 3.0;
+/// What is added to the mean for the first look and, times its logarithm, for their number: things that
+/// only look like a vehicle for a moment are more than vehicles. Fitted once by logistic regression on
+/// simulated candidates (1.0 for the mean beside them); `scripts/evaluate` prints how right it is.
+const FIRST_LOG: f64 = -1.5;
+const MORE_LOG: f64 = 0.4;
+/// More looks say nothing new.
+const MOST_LOOKS: u32 = 20;
+/// From look to look, 0.1 s later, another part of what stands is seen; what goes on by more drives.
+const FARTHEST_STEP_M: f64 = 0.35;
+/// Looks after which it may be listed.
+const FEWEST_LOOKS: u32 = 3;
+
+impl Candidate {
+    /// What begins with a cluster.
+    pub(super) fn new(track: Track, sighting: &Sighting) -> Self {
+        let mut candidate = Self {
+            track,
+            log_odds: sighting.log_odds,
+            looks: 1,
+            is_empty: false,
+            middle_m: sighting.look.middle_m,
+            step_m: Vector2::zeros(),
+        };
+        candidate.conclude();
+        candidate
+    }
+
+    /// Takes a cluster in that was found in its place.
+    pub(super) fn see(
+        &mut self,
+        sighting: &Sighting,
+        spots: &[Spot],
+        end: Time,
+        floor_z_m: f64,
+        outline: &mut Vec<[f64; 2]>,
+    ) {
+        self.looks = self.looks.saturating_add(1);
+        let gain = 1.0 / f64::from(self.looks).min(REACH);
+        self.log_odds += gain * (sighting.log_odds - self.log_odds);
+        self.is_empty = false;
+        let middle_m = sighting.look.middle_m;
+        let fresh_m = middle_m - self.middle_m;
+        self.step_m += (fresh_m - self.step_m) * gain;
+        self.middle_m = middle_m;
+        self.track
+            .measure(spots, &sighting.look, end, floor_z_m, outline);
+        self.conclude();
+    }
+
+    pub(super) fn reframe(
+        &mut self,
+        turn_rad: f64,
+        moved: impl Fn([f64; 2]) -> [f64; 2] + Copy,
+        rise_m: f64,
+    ) {
+        self.track.reframe(turn_rad, moved, rise_m);
+        self.middle_m = Vector2::from(moved(self.middle_m.into()));
+        self.step_m = Vector2::zeros();
+    }
+
+    /// Nothing was found in its place.
+    pub(super) fn miss(&mut self, sight: &Sight, end: Time) {
+        self.is_empty = sight.is_empty();
+        self.track.miss(sight, end);
+    }
+
+    fn conclude(&mut self) {
+        self.track.stand_as_vehicle(self.probability());
+    }
+
+    /// That it is a vehicle.
+    pub(super) fn probability(&self) -> f64 {
+        let looks = f64::from(self.looks.min(MOST_LOOKS));
+        let log_odds = self.log_odds + FIRST_LOG + MORE_LOG * libm::log(looks);
+        1.0 / (1.0 + libm::exp(-log_odds))
+    }
+
+    pub(super) fn place(&self) -> Rectangle {
+        self.track.rectangle()
+    }
+
+    /// Whether there is nothing left of it, or it is hardly a vehicle.
+    pub(super) fn is_gone(&self, parameters: &TrackParameters) -> bool {
+        const HARDLY: f64 = 0.02;
+        self.track.is_gone(parameters) || self.probability() < HARDLY
+    }
+
+    /// Whether it was looked at often enough to be listed, and is still there.
+    pub(super) fn is_known(&self) -> bool {
+        let stands = !self.is_empty && self.step_m.norm() < FARTHEST_STEP_M;
+        self.looks >= FEWEST_LOOKS && self.track.is_confirmed() && stands
+    }
+
+    /// Whether it is rather there than another one in the same place.
+    pub(super) fn is_better_than(&self, other: &Self) -> bool {
+        let worth =
+            |candidate: &Self| candidate.probability() * f64::from(candidate.looks.min(MOST_LOOKS));
+        worth(self) > worth(other)
+    }
+}
+
+/// Whether what is seen of a cluster may begin a candidate.
+pub(super) fn may_begin(sighting: &Sighting, parameters: &TrackParameters) -> bool {
+    let is_enough = sighting.look.points >= FEWEST_RETURNS;
+    is_enough && sighting.log_odds > LEAST_LOG && sighting.look.top_m > parameters.lowest_object_m
+}
+
+/// What looks less like a vehicle begins no candidate.
+pub(super) const LEAST_LOG: f64 = -1.5;

@@ -1,0 +1,462 @@
+//! Vehicles that stand, each remembered by its place.
+//!
+//! What stands is told by its looks alone, and the place where it stands is all that must be known to
+//! recognise it. So a cluster is judged as DBSCAN gives it (`appearance`, by a small network whose
+//! `weights` are fitted), and belongs to the `candidate` in whose place it lies. What moves there takes
+//! the candidate's identity over, and a vehicle that came to rest gives it back.
+
+mod appearance;
+
+mod candidate;
+
+mod weights;
+
+pub use appearance::FEATURES;
+
+use nalgebra::Vector2;
+
+use super::look::Look;
+use super::objects::floor_z_m;
+use super::placing::Placing;
+use super::road_user::Track;
+use super::sight::Sight;
+use super::spots::Spot;
+use super::{Object, Scene, TrackParameters};
+use crate::cluster::Clusters;
+use crate::ego::{Pose, wrapped_rad};
+use crate::geometry::Rectangle;
+use crate::time::{Span, Time};
+use appearance::{Appearance, Eye};
+use candidate::{Candidate, LEAST_LOG, Sighting, may_begin};
+
+/// Everything that stands and may be a vehicle.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Standing {
+    candidates: Vec<Candidate>,
+    /// Those that were listed and of which nothing is left.
+    lost: Vec<Lost>,
+    eye: Eye,
+    /// Of every cluster what it looks like, if it is not too small.
+    appearances: Vec<Option<Appearance>>,
+    placing: Placing,
+    spots: Vec<Spot>,
+    sightings: Vec<Sighting>,
+    pairs: Vec<Pair>,
+    is_taken: Vec<bool>,
+    is_seen: Vec<bool>,
+    outline: Vec<[f64; 2]>,
+}
+
+/// A listed candidate of which nothing is left: whoever stands there next is it.
+#[derive(Debug, Clone, Copy)]
+struct Lost {
+    id: u32,
+    place: Rectangle,
+    time: Time,
+}
+
+/// A candidate, a sighting in its place, and how far their middles are apart.
+#[derive(Debug, Clone, Copy)]
+struct Pair {
+    apart_m: f64,
+    candidate: usize,
+    sighting: usize,
+}
+
+/// Distance of a cluster's middle from the box of a candidate up to which it may belong to it.
+const BESIDE_M: f64 = 0.6;
+/// Farther away the network was not fitted.
+const FARTHEST_M: f64 = 50.0;
+/// How long a place is remembered.
+const MEMORY_S: f64 = 10.0;
+/// Two vehicles side by side are not nearer than this, from middle to middle.
+const NEAREST_M: f64 = 1.9;
+
+impl Standing {
+    pub(super) fn reset(&mut self) {
+        self.candidates.clear();
+        self.lost.clear();
+    }
+
+    /// The frame changed: what was at `from` is now at `to`.
+    pub(super) fn reframe(&mut self, from: &Pose, to: &Pose) {
+        let (old, new) = (from.placement(), to.placement());
+        let turn_rad = wrapped_rad(to.yaw_rad - from.yaw_rad);
+        let rise_m = to.position_m[2] - from.position_m[2];
+        let moved = |at| new.local_m(old.sensor_m(at));
+        for candidate in &mut self.candidates {
+            candidate.reframe(turn_rad, moved, rise_m);
+        }
+        for lost in &mut self.lost {
+            lost.place.centre_m = moved(lost.place.centre_m);
+            lost.place.yaw_rad += turn_rad;
+        }
+    }
+
+    /// What each cluster looks like, [`FEATURES`] numbers, zeros for one that is too small.
+    pub(super) fn appearances(&self) -> impl ExactSizeIterator<Item = [f64; FEATURES]> {
+        let all = self.appearances.iter();
+        all.map(|known| known.map_or([0.0; FEATURES], |appearance| appearance.features))
+    }
+
+    /// Takes the clusters of a revolution in.
+    pub(super) fn process(
+        &mut self,
+        clusters: &Clusters,
+        scene: &Scene<'_>,
+        parameters: &TrackParameters,
+    ) {
+        let end = scene.scan.time();
+        self.predict(scene, end);
+        self.take_sightings(clusters, scene);
+        self.pair();
+        self.update(scene, end);
+        self.begin(scene, end, parameters);
+        self.tidy(end, parameters);
+    }
+
+    fn predict(&mut self, scene: &Scene<'_>, end: Time) {
+        let placement = scene.sweep.sensor.placement();
+        for candidate in &mut self.candidates {
+            let [x, y] = placement.sensor_m(candidate.track.position_m().into());
+            let age_s = scene.scan.age_s(scene.scan.column_at(libm::atan2(x, y)));
+            candidate.track.predict(end + Span::from_seconds(-age_s));
+        }
+    }
+
+    /// Looks at every cluster, and closer at those that may be a vehicle or lie where one is known.
+    fn take_sightings(&mut self, clusters: &Clusters, scene: &Scene<'_>) {
+        let placement = scene.sweep.sensor.placement();
+        let origin_m = placement.origin_m();
+        self.placing.begin(scene, origin_m);
+        self.appearances.clear();
+        self.spots.clear();
+        self.sightings.clear();
+        for points in clusters.iter() {
+            let appearance = self.eye.look(points, scene);
+            self.appearances.push(appearance);
+            let Some(appearance) = appearance else {
+                continue;
+            };
+            let log_odds = appearance.vehicle_log_odds();
+            let [x, y] = appearance.middle_m;
+            let middle_m = placement.local_m([x, y]);
+            let is_near = |candidate: &Candidate| {
+                let place = candidate.place();
+                let [east_m, north_m] = [0, 1].map(|axis| middle_m[axis] - place.centre_m[axis]);
+                libm::hypot(east_m, north_m) < place.radius_m() + 2.0 * BESIDE_M
+            };
+            let is_within_reach = libm::hypot(x, y) < FARTHEST_M;
+            let may_be = is_within_reach && log_odds > LEAST_LOG;
+            if !may_be && !self.candidates.iter().any(is_near) {
+                continue;
+            }
+            let begin = self.spots.len();
+            self.placing.place(points, scene);
+            let placed = self.placing.iter();
+            let spots = placed.map(|placed| Spot::new(scene, placed.point, placed.at_m, 0));
+            self.spots.extend(spots);
+            let spots = begin..self.spots.len();
+            let sensor_m = Vector2::from(origin_m);
+            self.sightings.push(Sighting {
+                look: Look::at(&self.spots[spots.clone()], scene.scan, sensor_m),
+                spots,
+                log_odds,
+            });
+        }
+    }
+
+    /// Finds the sightings in the places of candidates, the nearest first.
+    fn pair(&mut self) {
+        self.pairs.clear();
+        for (candidate, known) in self.candidates.iter().enumerate() {
+            let place = known.place();
+            let outline = place.outline();
+            for (sighting, seen) in self.sightings.iter().enumerate() {
+                let middle_m = seen.look.middle_m;
+                if outline.distance_m(middle_m.into()) < BESIDE_M {
+                    let apart_m = (middle_m - Vector2::from(place.centre_m)).norm();
+                    self.pairs.push(Pair {
+                        apart_m,
+                        candidate,
+                        sighting,
+                    });
+                }
+            }
+        }
+        self.pairs.sort_by(|a, b| a.apart_m.total_cmp(&b.apart_m));
+    }
+
+    fn update(&mut self, scene: &Scene<'_>, end: Time) {
+        self.is_taken.clear();
+        self.is_taken.resize(self.sightings.len(), false);
+        self.is_seen.clear();
+        self.is_seen.resize(self.candidates.len(), false);
+        for pair in &self.pairs {
+            let (is_seen, is_taken) = (
+                &mut self.is_seen[pair.candidate],
+                &mut self.is_taken[pair.sighting],
+            );
+            if *is_seen || *is_taken {
+                continue;
+            }
+            (*is_seen, *is_taken) = (true, true);
+            let sighting = &self.sightings[pair.sighting];
+            let spots = &self.spots[sighting.spots.clone()];
+            let floor_z_m = floor_z_m(spots, scene);
+            let candidate = &mut self.candidates[pair.candidate];
+            candidate.see(sighting, spots, end, floor_z_m, &mut self.outline);
+        }
+        let placement = scene.sweep.sensor.placement();
+        let sensor_height_m = scene.ground.plane.height_m();
+        let missed = self.candidates.iter_mut().zip(&self.is_seen);
+        for (candidate, _) in missed.filter(|(_, is_seen)| !**is_seen) {
+            let (place, height_m) = (candidate.place(), candidate.track.height_m());
+            let sight = Sight::at(scene.scan, &placement, sensor_height_m, &place, height_m);
+            candidate.miss(&sight, end);
+        }
+    }
+
+    /// New candidates from what lies in the place of none.
+    fn begin(&mut self, scene: &Scene<'_>, end: Time, parameters: &TrackParameters) {
+        for (sighting, is_taken) in self.sightings.iter().zip(&self.is_taken) {
+            let middle_m = sighting.look.middle_m.into();
+            let is_within = |candidate: &Candidate| candidate.place().outline().contains(middle_m);
+            let may_be = !is_taken && may_begin(sighting, parameters);
+            if !may_be || self.candidates.iter().any(is_within) {
+                continue;
+            }
+            let spots = &self.spots[sighting.spots.clone()];
+            let floor_z_m = floor_z_m(spots, scene);
+            let outline = &mut self.outline;
+            let track = Track::new(0, false, spots, &sighting.look, end, floor_z_m, outline);
+            self.candidates.push(Candidate::new(track, sighting));
+        }
+    }
+
+    /// Drops what is gone, and the worse of two in one place.
+    fn tidy(&mut self, end: Time, parameters: &TrackParameters) {
+        let mut number = 0;
+        while number < self.candidates.len() {
+            let own = &self.candidates[number];
+            let place = own.place();
+            let is_within = |other: &Candidate| {
+                other.is_better_than(own) && is_one_place(&other.place(), &place)
+            };
+            if own.is_gone(parameters) || self.candidates.iter().any(is_within) {
+                let gone = self.candidates.remove(number);
+                if gone.track.is_listed {
+                    self.lost.push(Lost {
+                        id: gone.track.id,
+                        place: gone.place(),
+                        time: end,
+                    });
+                }
+            } else {
+                number += 1;
+            }
+        }
+        self.lost
+            .retain(|lost| (end - lost.time).seconds() < MEMORY_S);
+    }
+
+    /// Gives what moves now the place of what stood there, with its identity if it has none that
+    /// others know.
+    pub(super) fn give_way(&mut self, tracks: &mut [Track]) {
+        for track in tracks.iter_mut().filter(|track| track.goes_beyond_doubt()) {
+            let place = track.rectangle();
+            let gone = self
+                .candidates
+                .extract_if(.., |candidate| is_one_place(&candidate.place(), &place));
+            for candidate in gone.filter(|candidate| candidate.track.is_listed) {
+                if !track.is_listed {
+                    (track.id, track.is_listed) = (candidate.track.id, true);
+                }
+            }
+        }
+    }
+
+    /// Adds those that are as likely as that, but for those in the place of an object that is listed
+    /// already. Who is listed for the first time takes the identity of what was lost there or came to
+    /// rest there, or the next one.
+    pub(super) fn list(
+        &mut self,
+        end: Time,
+        least_confidence: f64,
+        tracks: &mut [Track],
+        next_id: &mut u32,
+        objects: &mut Vec<Object>,
+    ) {
+        let listed = objects.len();
+        for candidate in &mut self.candidates {
+            let place = candidate.place();
+            let is_other = |other: &Object| is_one_place(&place, &other.rectangle());
+            let existence = candidate.track.object(end).existence;
+            if !candidate.is_known()
+                || existence < least_confidence
+                || objects[..listed].iter().any(is_other)
+            {
+                continue;
+            }
+            let track = &mut candidate.track;
+            if !track.is_listed {
+                track.is_listed = true;
+                let lost = self
+                    .lost
+                    .iter()
+                    .position(|lost| is_one_place(&lost.place, &place));
+                let resting = tracks.iter_mut().find(|resting| {
+                    resting.is_listed
+                        && resting.is_left_standing()
+                        && is_one_place(&resting.rectangle(), &place)
+                });
+                track.id = match (lost, resting) {
+                    (_, Some(resting)) => {
+                        resting.is_listed = false;
+                        std::mem::replace(&mut resting.id, take_next(next_id))
+                    }
+                    (Some(lost), None) => self.lost.swap_remove(lost).id,
+                    (None, None) => take_next(next_id),
+                };
+            }
+            objects.push(track.object(end));
+        }
+    }
+}
+
+fn take_next(next_id: &mut u32) -> u32 {
+    let id = *next_id;
+    *next_id = next_id.wrapping_add(1);
+    id
+}
+
+/// Whether two boxes are of one vehicle: the middle of one lies in the other, or near its middle.
+fn is_one_place(one: &Rectangle, other: &Rectangle) -> bool {
+    let holds = |a: &Rectangle, b: &Rectangle| a.outline().contains(b.centre_m);
+    let off = [0, 1].map(|axis| one.centre_m[axis] - other.centre_m[axis]);
+    holds(one, other) || holds(other, one) || libm::hypot(off[0], off[1]) < NEAREST_M
+}
+
+#[cfg(test)]
+mod tests {
+    use super::appearance::tests::{Block, CAR, scan_of_blocks};
+    use super::*;
+    use crate::cloud::Scan;
+    use crate::cloud::tests::later;
+    use crate::cluster::{ClusterParameters, Dbscan};
+    use crate::parameter::Profile;
+    use crate::track::Class;
+    use crate::track::tests::with_scene;
+
+    struct Street {
+        standing: Standing,
+        parameters: TrackParameters,
+        next_id: u32,
+        seconds: f64,
+    }
+
+    impl Street {
+        fn new() -> Self {
+            Self {
+                standing: Standing::default(),
+                parameters: TrackParameters::profile(Profile::Default),
+                next_id: 7,
+                seconds: 0.0,
+            }
+        }
+
+        /// A revolution, and what is listed after it beside what is already.
+        fn see(&mut self, scan: &Scan, tracks: &mut [Track], others: &[Object]) -> Vec<Object> {
+            let scan = later(scan, self.seconds);
+            self.seconds += 0.1;
+            let mut dbscan = Dbscan::new(&ClusterParameters::profile(Profile::Default));
+            let mut objects = others.to_vec();
+            with_scene(&scan, |scene| {
+                let clusters = dbscan.process(&scan, &vec![false; scan.len()], scene.heights_m);
+                self.standing.process(clusters, scene, &self.parameters);
+            });
+            self.standing.give_way(tracks);
+            let least = self.parameters.least_confidence;
+            let next_id = &mut self.next_id;
+            self.standing
+                .list(scan.time(), least, tracks, next_id, &mut objects);
+            objects
+        }
+    }
+
+    /// A track of what is seen there, as if it had moved.
+    fn mover(scan: &Scan) -> Track {
+        let (mut track, _) = crate::track::tests::followed([scan]);
+        track.moves_for_tests();
+        track
+    }
+
+    #[test]
+    fn a_car_is_listed_after_three_looks_keeps_its_id_and_does_not_move() {
+        let mut street = Street::new();
+        let car = scan_of_blocks(&CAR);
+        let counts: Vec<usize> = (0..3)
+            .map(|_| street.see(&car, &mut [], &[]).len())
+            .collect();
+        assert_eq!(counts, [0, 0, 1]);
+        for _ in 0..5 {
+            let [seen] = &street.see(&car, &mut [], &[])[..] else {
+                panic!("it is one");
+            };
+            assert_eq!((seen.id, seen.speed_mps, seen.class), (7, 0.0, Class::Car));
+            assert!(seen.existence > 0.5 && seen.existence < 1.0, "{seen:?}");
+        }
+    }
+
+    #[test]
+    fn walls_are_not_listed() {
+        let mut street = Street::new();
+        let wall = scan_of_blocks(&[Block {
+            sides_m: [0.3, 12.0],
+            heights_m: [0.1, 2.4],
+            ..CAR[0]
+        }]);
+        assert!((0..6).all(|_| street.see(&wall, &mut [], &[]).is_empty()));
+    }
+
+    #[test]
+    fn what_drives_off_takes_the_identity_along_and_leaves_nothing_behind() {
+        let mut street = Street::new();
+        let car = scan_of_blocks(&CAR);
+        (0..4).for_each(|_| drop(street.see(&car, &mut [], &[])));
+        let mut tracks = [mover(&car)];
+        assert!(street.see(&car, &mut tracks, &[]).is_empty());
+        assert_eq!((tracks[0].id, tracks[0].is_listed), (7, true));
+        let empty = scan_of_blocks(&[]);
+        assert!(street.see(&empty, &mut tracks, &[]).is_empty());
+    }
+
+    #[test]
+    fn what_came_to_rest_and_what_was_lost_is_the_same_again() {
+        let car = scan_of_blocks(&CAR);
+        let mut street = Street::new();
+        let (mut rested, _) = crate::track::tests::followed([&car]);
+        (rested.id, rested.is_published, rested.is_listed) = (3, true, true);
+        rested.stand_as_vehicle(1.0);
+        let mut tracks = [rested];
+        let last = |street: &mut Street, tracks: &mut [Track]| {
+            let seen = (0..4).map(|_| street.see(&car, tracks, &[]));
+            seen.last().map(|objects| objects[0].id)
+        };
+        assert_eq!(last(&mut street, &mut tracks), Some(3));
+        assert!(!tracks[0].is_listed && tracks[0].id == 7);
+        let empty = scan_of_blocks(&[]);
+        (0..40).for_each(|_| drop(street.see(&empty, &mut [], &[])));
+        assert!(street.standing.candidates.is_empty());
+        assert_eq!(last(&mut street, &mut []), Some(3));
+    }
+
+    #[test]
+    fn what_is_listed_already_is_not_listed_twice() {
+        let car = scan_of_blocks(&CAR);
+        let mut street = Street::new();
+        let others = (0..4).map(|_| street.see(&car, &mut [], &[])).last();
+        let others = others.unwrap_or_default();
+        assert_eq!(street.see(&car, &mut [], &others).len(), 1);
+    }
+}
