@@ -62,8 +62,8 @@ impl Eye {
         self.look_at_surface(points, scene);
         let mut range_m = 0.0;
         let (mut top, mut floor_m) = (points[0], f32::INFINITY);
-        for (point, [x, y]) in points.iter().zip(&self.places_m) {
-            range_m += libm::hypot(*x, *y) / count;
+        for point in points {
+            range_m += f64::from(scan.distance_m(*point as usize)) / count;
             let height_m = scene.heights_m[*point as usize];
             floor_m = floor_m.min(height_m);
             if height_m > scene.heights_m[top as usize] {
@@ -99,8 +99,8 @@ impl Eye {
     /// one of them, 0 for nothing.
     fn look_at_columns(&mut self, points: &[u32], scene: &Scene<'_>) -> (u32, f64) {
         let scan = scene.scan;
-        let (ranges_m, xs_m, ys_m) = (scan.range_m(), scan.x_m(), scan.y_m());
-        let level_m = |point: usize| libm::hypot(f64::from(xs_m[point]), f64::from(ys_m[point]));
+        let ranges_m = scan.range_m();
+        let level_m = |point: usize| f64::from(scan.distance_m(point));
         self.depths_m.clear();
         self.beyond_m.clear();
         let (mut columns, mut highest_m) = (0, 0.0f64);
