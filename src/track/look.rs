@@ -9,6 +9,7 @@ use super::spots::{Spot, bounds_m};
 use crate::beams::Seen;
 use crate::cloud::{MAX_LAYERS, Scan};
 use crate::float::least;
+use crate::time::{Span, Time};
 
 /// Everything that is measured of a group without knowing the object.
 #[derive(Debug, Clone, Copy)]
@@ -134,6 +135,11 @@ impl Look {
     pub(super) fn is_new(&self) -> bool {
         const FEWEST: f64 = 4.0;
         self.new >= FEWEST && self.new > self.old
+    }
+
+    /// When the sensor saw it, in a sweep that ended at a time.
+    pub(super) fn seen_at(&self, end: Time) -> Time {
+        end + Span::from_seconds(-self.age_s)
     }
 
     /// Direction from the sensor, as a unit vector.

@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 
 use super::reunion::Parting;
 use super::{MOVING_MPS, SURELY_NONE, Track};
-use crate::time::{Span, Time};
+use crate::time::Time;
 use crate::track::belief::{Belief, Qualities};
 use crate::track::look::Look;
 use crate::track::shape::fitted_yaw;
@@ -32,7 +32,7 @@ impl Track {
         floor_z_m: f64,
         outline: &mut Vec<[f64; 2]>,
     ) {
-        let seen_at = end + Span::from_seconds(-look.age_s);
+        let seen_at = look.seen_at(end);
         self.predict(seen_at);
         if let Some((yaw_rad, deviation_rad)) = fitted_yaw(spots, outline) {
             self.shape.measure_yaw(yaw_rad, deviation_rad);
@@ -216,6 +216,7 @@ impl Track {
 mod tests {
     use super::*;
     use crate::cloud::tests::scan_of;
+    use crate::time::Span;
     use crate::track::tests::spots_of;
 
     /// What is 4.2 m long, 1.4 m deep and 20 m away, goes on above in a share of its columns, was

@@ -29,7 +29,7 @@ use super::trace::Trace;
 use super::trail::Trails;
 use super::view::View;
 use crate::geometry::Rectangle;
-use crate::time::{Span, Time};
+use crate::time::Time;
 use newness::Newness;
 use reunion::Parting;
 
@@ -115,7 +115,7 @@ impl Track {
         outline: &mut Vec<[f64; 2]>,
     ) -> Self {
         let shape = Shape::first(spots, look, outline);
-        let time = end + Span::from_seconds(-look.age_s);
+        let time = look.seen_at(end);
         let mut track = Self {
             id,
             time,

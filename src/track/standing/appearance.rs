@@ -26,7 +26,7 @@ pub(super) struct Eye {
 }
 
 /// Fewer returns look like anything.
-pub(super) const FEWEST_RETURNS: usize = 5;
+const FEWEST_RETURNS: usize = 5;
 /// What is nearer than a top by more hides what is above it.
 const OCCLUDER_M: f64 = 0.7;
 /// Of what is above a cluster, what stands within this distance of it may be a part of it.

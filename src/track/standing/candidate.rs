@@ -2,7 +2,6 @@
 
 use nalgebra::Vector2;
 
-use super::appearance::FEWEST_RETURNS;
 use crate::geometry::Rectangle;
 use crate::time::Time;
 use crate::track::TrackParameters;
@@ -30,9 +29,10 @@ pub(super) struct Candidate {
     looks: u32,
     /// Whether rays passed through its place when it was looked at last.
     is_empty: bool,
-    /// Middle of the last look, and how far it went from look to look of late.
+    /// When and where the middle of the last look was, and how fast it went of late.
+    seen_at: Time,
     middle_m: Vector2<f64>,
-    step_m: Vector2<f64>,
+    velocity_mps: Vector2<f64>,
 }
 
 /// Looks that the mean reaches back: later ones are mostly nearer.
@@ -44,21 +44,24 @@ const FIRST_LOG: f64 = -1.5;
 const MORE_LOG: f64 = 0.4;
 /// More looks say nothing new.
 const MOST_LOOKS: u32 = 20;
-/// From look to look, 0.1 s later, another part of what stands is seen; what goes on by more drives.
-const FARTHEST_STEP_M: f64 = 0.35;
+/// From look to look another part of what stands is seen; what goes on faster drives.
+const FASTEST_MPS: f64 = 3.5;
+/// No two looks follow each other faster: a revolution at 20 Hz.
+const SHORTEST_S: f64 = 0.05;
 /// Looks after which it may be listed.
 const FEWEST_LOOKS: u32 = 3;
 
 impl Candidate {
     /// What begins with a cluster.
-    pub(super) fn new(track: Track, sighting: &Sighting) -> Self {
+    pub(super) fn new(track: Track, sighting: &Sighting, end: Time) -> Self {
         let mut candidate = Self {
             track,
             log_odds: sighting.log_odds,
             looks: 1,
             is_empty: false,
+            seen_at: sighting.look.seen_at(end),
             middle_m: sighting.look.middle_m,
-            step_m: Vector2::zeros(),
+            velocity_mps: Vector2::zeros(),
         };
         candidate.conclude();
         candidate
@@ -78,9 +81,11 @@ impl Candidate {
         self.log_odds += gain * (sighting.log_odds - self.log_odds);
         self.is_empty = false;
         let middle_m = sighting.look.middle_m;
-        let fresh_m = middle_m - self.middle_m;
-        self.step_m += (fresh_m - self.step_m) * gain;
-        self.middle_m = middle_m;
+        let seen_at = sighting.look.seen_at(end);
+        let seconds = (seen_at - self.seen_at).seconds().max(SHORTEST_S);
+        let fresh_mps = (middle_m - self.middle_m) / seconds;
+        self.velocity_mps += (fresh_mps - self.velocity_mps) * gain;
+        (self.seen_at, self.middle_m) = (seen_at, middle_m);
         self.track
             .measure(spots, &sighting.look, end, floor_z_m, outline);
         self.conclude();
@@ -94,7 +99,7 @@ impl Candidate {
     ) {
         self.track.reframe(turn_rad, moved, rise_m);
         self.middle_m = Vector2::from(moved(self.middle_m.into()));
-        self.step_m = Vector2::zeros();
+        self.velocity_mps = Vector2::zeros();
     }
 
     /// Nothing was found in its place.
@@ -126,7 +131,7 @@ impl Candidate {
 
     /// Whether it was looked at often enough to be listed, and is still there.
     pub(super) fn is_known(&self) -> bool {
-        let stands = !self.is_empty && self.step_m.norm() < FARTHEST_STEP_M;
+        let stands = !self.is_empty && self.velocity_mps.norm() < FASTEST_MPS;
         self.looks >= FEWEST_LOOKS && self.track.is_confirmed() && stands
     }
 
@@ -140,8 +145,7 @@ impl Candidate {
 
 /// Whether what is seen of a cluster may begin a candidate.
 pub(super) fn may_begin(sighting: &Sighting, parameters: &TrackParameters) -> bool {
-    let is_enough = sighting.look.points >= FEWEST_RETURNS;
-    is_enough && sighting.log_odds > LEAST_LOG && sighting.look.top_m > parameters.lowest_object_m
+    sighting.log_odds > LEAST_LOG && sighting.look.top_m > parameters.lowest_object_m
 }
 
 /// What looks less like a vehicle begins no candidate.

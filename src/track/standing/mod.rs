@@ -16,6 +16,7 @@ pub use appearance::FEATURES;
 use nalgebra::Vector2;
 
 use super::look::Look;
+use super::nearby::Discs;
 use super::objects::floor_z_m;
 use super::placing::Placing;
 use super::road_user::Track;
@@ -24,7 +25,7 @@ use super::spots::Spot;
 use super::{Object, Scene, TrackParameters};
 use crate::cluster::Clusters;
 use crate::ego::{Pose, wrapped_rad};
-use crate::geometry::Rectangle;
+use crate::geometry::{Outline, Rectangle};
 use crate::time::{Span, Time};
 use appearance::{Appearance, Eye};
 use candidate::{Candidate, LEAST_LOG, Sighting, may_begin};
@@ -35,6 +36,9 @@ pub(super) struct Standing {
     candidates: Vec<Candidate>,
     /// Those that were listed and of which nothing is left.
     lost: Vec<Lost>,
+    /// Where the candidates are expected, and how far a cluster of theirs may be.
+    places: Vec<(Rectangle, Outline)>,
+    reaches: Discs,
     eye: Eye,
     /// Of every cluster what it looks like, if it is not too small.
     appearances: Vec<Option<Appearance>>,
@@ -67,6 +71,8 @@ struct Pair {
 const BESIDE_M: f64 = 0.6;
 /// Farther away the network was not fitted.
 const FARTHEST_M: f64 = 50.0;
+/// There are no more vehicles within that distance; whatever else there is costs no more.
+const MOST_CANDIDATES: usize = 200;
 /// How long a place is remembered.
 const MEMORY_S: f64 = 10.0;
 /// Two vehicles side by side are not nearer than this, from middle to middle.
@@ -122,6 +128,14 @@ impl Standing {
             let age_s = scene.scan.age_s(scene.scan.column_at(libm::atan2(x, y)));
             candidate.track.predict(end + Span::from_seconds(-age_s));
         }
+        self.places.clear();
+        self.reaches.begin(placement.origin_m().into());
+        for candidate in &self.candidates {
+            let place = candidate.place();
+            let reach_m = place.radius_m() + 2.0 * BESIDE_M;
+            self.reaches.push(place.centre_m.into(), reach_m);
+            self.places.push((place, place.outline()));
+        }
     }
 
     /// Looks at every cluster, and closer at those that may be a vehicle or lie where one is known.
@@ -141,14 +155,8 @@ impl Standing {
             let log_odds = appearance.vehicle_log_odds();
             let [x, y] = appearance.middle_m;
             let middle_m = placement.local_m([x, y]);
-            let is_near = |candidate: &Candidate| {
-                let place = candidate.place();
-                let [east_m, north_m] = [0, 1].map(|axis| middle_m[axis] - place.centre_m[axis]);
-                libm::hypot(east_m, north_m) < place.radius_m() + 2.0 * BESIDE_M
-            };
-            let is_within_reach = libm::hypot(x, y) < FARTHEST_M;
-            let may_be = is_within_reach && log_odds > LEAST_LOG;
-            if !may_be && !self.candidates.iter().any(is_near) {
+            let may_be = log_odds > LEAST_LOG && libm::hypot(x, y) < FARTHEST_M;
+            if !may_be && self.reaches.near(middle_m.into()).next().is_none() {
                 continue;
             }
             let begin = self.spots.len();
@@ -169,11 +177,10 @@ impl Standing {
     /// Finds the sightings in the places of candidates, the nearest first.
     fn pair(&mut self) {
         self.pairs.clear();
-        for (candidate, known) in self.candidates.iter().enumerate() {
-            let place = known.place();
-            let outline = place.outline();
-            for (sighting, seen) in self.sightings.iter().enumerate() {
-                let middle_m = seen.look.middle_m;
+        for (sighting, seen) in self.sightings.iter().enumerate() {
+            let middle_m = seen.look.middle_m;
+            for candidate in self.reaches.near(middle_m) {
+                let (place, outline) = &self.places[candidate];
                 if outline.distance_m(middle_m.into()) < BESIDE_M {
                     let apart_m = (middle_m - Vector2::from(place.centre_m)).norm();
                     self.pairs.push(Pair {
@@ -220,6 +227,9 @@ impl Standing {
     /// New candidates from what lies in the place of none.
     fn begin(&mut self, scene: &Scene<'_>, end: Time, parameters: &TrackParameters) {
         for (sighting, is_taken) in self.sightings.iter().zip(&self.is_taken) {
+            if self.candidates.len() >= MOST_CANDIDATES {
+                return;
+            }
             let middle_m = sighting.look.middle_m.into();
             let is_within = |candidate: &Candidate| candidate.place().outline().contains(middle_m);
             let may_be = !is_taken && may_begin(sighting, parameters);
@@ -230,7 +240,7 @@ impl Standing {
             let floor_z_m = floor_z_m(spots, scene);
             let outline = &mut self.outline;
             let track = Track::new(0, false, spots, &sighting.look, end, floor_z_m, outline);
-            self.candidates.push(Candidate::new(track, sighting));
+            self.candidates.push(Candidate::new(track, sighting, end));
         }
     }
 
