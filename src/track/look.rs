@@ -91,12 +91,7 @@ impl Look {
         let middle_m = sensor_m + sight_m;
         let range_m = sight_m.norm();
         let top_m = f64::from(top_m);
-        let layer = scan.layer(top_point);
-        let top_below_m = if layer + 1 < MAX_LAYERS && !is_covered(scan, top_point) {
-            top_m + range_m * (scan.slope(layer + 1).0 - scan.slope(layer).0)
-        } else {
-            f64::MAX
-        };
+        let top_below_m = passed_m(scan, top_point, top_m, range_m);
         let upper_m = extent_m(spots, |above_m| above_m > UPPER_M, FEWEST_UPPER);
         let returns_seen = |before: Seen| {
             let seen = spots.iter().filter(|spot| spot.before == before);
@@ -159,6 +154,16 @@ fn may_be_upright(spots: &[Spot], scan: &Scan, range_m: f64) -> bool {
         layers | 1 << scan.layer(spot.point as usize)
     });
     layers.count_ones() > 1 || step_m > LOWEST_M
+}
+
+/// Where the next ray passed over the topmost point of something, so high above the ground and so far away; as high as
+/// can be where something hides that, or no ray is higher.
+pub(super) fn passed_m(scan: &Scan, top_point: usize, top_m: f64, range_m: f64) -> f64 {
+    let layer = scan.layer(top_point);
+    if layer + 1 == MAX_LAYERS || is_covered(scan, top_point) {
+        return f64::MAX;
+    }
+    top_m + range_m * (scan.slope(layer + 1).0 - scan.slope(layer).0)
 }
 
 /// Whether something nearer hides what is above a point.
@@ -261,36 +266,43 @@ fn extent_m(spots: &[Spot], is_there: impl Fn(f32) -> bool, fewest: usize) -> Op
 fn roughness_m(spots: &[Spot], scan: &Scan) -> f64 {
     /// More say nothing new.
     const MOST: usize = 64;
-    /// A jump between two surfaces says nothing of either.
-    const EDGE_M: f32 = 0.6;
-    let mut jumps = [0.0f32; MOST];
+    let mut jumps_m = [0.0; MOST];
     let mut count = 0;
-    let ranges = scan.range_m();
-    let columns = scan.columns();
     let stride = spots.len().div_ceil(MOST).max(1);
-    for spot in spots.iter().step_by(stride) {
-        let point = spot.point as usize;
-        let (column, layer) = (scan.column(point), scan.layer(point));
-        let before = ranges[scan.index(scan.over_seam(column + columns - 1), layer)];
-        let after = ranges[scan.index(scan.over_seam(column + 1), layer)];
-        let here = ranges[point];
-        let near = |other: f32| other > 0.0 && (other - here).abs() < EDGE_M;
-        if near(before) && near(after) {
-            jumps[count] = (before + after - 2.0 * here).abs() * 0.5;
-            count += 1;
-        }
+    let some = spots.iter().step_by(stride);
+    for fresh_m in some.filter_map(|spot| jump_m(scan, spot.point as usize)) {
+        jumps_m[count] = fresh_m;
+        count += 1;
     }
-    /// Fewer neighbours say nothing; most things are smooth.
-    const FEWEST: usize = 4;
-    if count < FEWEST {
-        return UNKNOWN_ROUGHNESS_M;
-    }
-    let middle = count / 2;
-    let (_, median, _) = jumps[..count].select_nth_unstable_by(middle, f32::total_cmp);
-    f64::from(*median)
+    median_jump_m(&mut jumps_m[..count])
 }
 
-const UNKNOWN_ROUGHNESS_M: f64 = 0.03;
+/// By how much the range of a point jumps out of those of its neighbours in the layer; `None` where one is missing, or
+/// of another surface.
+pub(super) fn jump_m(scan: &Scan, point: usize) -> Option<f32> {
+    /// A jump between two surfaces says nothing of either.
+    const EDGE_M: f32 = 0.6;
+    let (ranges_m, columns) = (scan.range_m(), scan.columns());
+    let (column, layer) = (scan.column(point), scan.layer(point));
+    let before = ranges_m[scan.index(scan.over_seam(column + columns - 1), layer)];
+    let after = ranges_m[scan.index(scan.over_seam(column + 1), layer)];
+    let here = ranges_m[point];
+    let near = |other: f32| other > 0.0 && (other - here).abs() < EDGE_M;
+    (near(before) && near(after)).then(|| (before + after - 2.0 * here).abs() * 0.5)
+}
+
+/// Median of jumps, if they are not too few.
+pub(super) fn median_jump_m(jumps_m: &mut [f32]) -> f64 {
+    /// Fewer neighbours say nothing; most things are smooth.
+    const FEWEST: usize = 4;
+    const UNKNOWN_M: f64 = 0.03;
+    if jumps_m.len() < FEWEST {
+        return UNKNOWN_M;
+    }
+    let middle = jumps_m.len() / 2;
+    let (_, median_m, _) = jumps_m.select_nth_unstable_by(middle, f32::total_cmp);
+    f64::from(*median_m)
+}
 
 #[cfg(test)]
 mod tests {

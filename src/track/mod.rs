@@ -76,6 +76,8 @@ mod trail;
 
 mod view;
 
+use nalgebra::Vector2;
+
 pub use class::Class;
 pub use standing::FEATURES as APPEARANCE_FEATURES;
 
@@ -86,7 +88,7 @@ use crate::ego::{Anchor, Placement, Pose, Sweep};
 use crate::geometry::Rectangle;
 use crate::ground::GroundReport;
 use crate::parameter::{choices, parameters};
-use crate::time::Time;
+use crate::time::{Span, Time};
 use nearest::NearestTracker;
 use objects::ObjectTracker;
 use road_user::Track;
@@ -215,6 +217,15 @@ pub struct Scene<'a> {
     pub beams: &'a Beams,
 }
 
+impl Scene<'_> {
+    /// When the sensor passed over a place.
+    fn passed_at(&self, place_m: Vector2<f64>) -> Time {
+        let [x, y] = self.sweep.sensor.placement().sensor_m(place_m.into());
+        let age_s = self.scan.age_s(self.scan.column_at(libm::atan2(x, y)));
+        self.scan.time() + Span::from_seconds(-age_s)
+    }
+}
+
 /// The track step.
 #[derive(Debug, Clone)]
 pub struct Tracker {
@@ -320,13 +331,10 @@ impl Tracker {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector2;
-
     use super::look::Look;
     use super::spots::Spot;
     use super::*;
     use crate::ground::{Origin, Plane};
-    use crate::time::Span;
 
     /// All returns of a scan, seen by a sensor at the origin.
     pub(super) fn spots_of(scan: &Scan) -> Vec<Spot> {

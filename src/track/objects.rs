@@ -16,7 +16,7 @@ use super::{Object, Scene, TrackParameters};
 use crate::cluster::Clusters;
 use crate::ego::{Pose, wrapped_rad};
 use crate::geometry::{Outline, Rectangle};
-use crate::time::{Span, Time};
+use crate::time::Time;
 
 /// Tracks of road users.
 #[derive(Debug, Clone, Default)]
@@ -102,9 +102,10 @@ impl ObjectTracker {
         let (old, new) = (from.placement(), to.placement());
         let turn_rad = wrapped_rad(to.yaw_rad - from.yaw_rad);
         let rise_m = to.position_m[2] - from.position_m[2];
-        self.standing.reframe(from, to);
+        let moved = |at| new.local_m(old.sensor_m(at));
+        self.standing.reframe(turn_rad, moved, rise_m);
         for track in self.tracks.iter_mut().chain(&mut self.lost) {
-            track.reframe(turn_rad, |at| new.local_m(old.sensor_m(at)), rise_m);
+            track.reframe(turn_rad, moved, rise_m);
         }
     }
 
@@ -133,14 +134,10 @@ impl ObjectTracker {
 
     /// Every track that is looked at to the time at which the sensor passed over its place.
     fn predict(&mut self, scene: &Scene<'_>, end: Time) {
-        let placement = scene.sweep.sensor.placement();
         for track in self.tracks.iter_mut().filter(|track| !track.rests()) {
             let expected = track.position_m()
                 + track.velocity_mps() * (end - track.last_measured).seconds().clamp(0.0, 0.2);
-            let [x, y] = placement.sensor_m(expected.into());
-            let column = scene.scan.column_at(libm::atan2(x, y));
-            let age_s = scene.scan.age_s(column);
-            track.predict(end + Span::from_seconds(-age_s));
+            track.predict(scene.passed_at(expected));
         }
     }
 
@@ -390,6 +387,7 @@ mod tests {
     use crate::cloud::tests::{later, scan_of};
     use crate::cluster::{ClusterParameters, Dbscan};
     use crate::parameter::Profile;
+    use crate::time::Span;
     use crate::track::look::Look;
     use crate::track::spots::Spot;
     use crate::track::tests::{spots_of, with_scene};

@@ -4,6 +4,7 @@ use super::weights::{BIAS, HIDDEN};
 use crate::cloud::MAX_LAYERS;
 use crate::geometry::{Rectangle, turned};
 use crate::track::Scene;
+use crate::track::look::{jump_m, median_jump_m, passed_m};
 
 /// How many numbers tell what a cluster looks like.
 pub const FEATURES: usize = 12;
@@ -22,20 +23,13 @@ pub(super) struct Eye {
     places_m: Vec<[f64; 2]>,
     depths_m: Vec<f64>,
     beyond_m: Vec<f64>,
-    jumps_m: Vec<f64>,
+    jumps_m: Vec<f32>,
 }
 
 /// Fewer returns look like anything.
 const FEWEST_RETURNS: usize = 5;
-/// What is nearer than a top by more hides what is above it.
-const OCCLUDER_M: f64 = 0.7;
 /// Of what is above a cluster, what stands within this distance of it may be a part of it.
 const ABOVE_M: f64 = 2.0;
-/// A larger jump between neighbours is one between two surfaces.
-const EDGE_M: f32 = 0.6;
-/// Fewer jumps say nothing of a surface, and most are as smooth as this.
-const FEWEST_JUMPS: usize = 4;
-const SMOOTH_M: f64 = 0.03;
 /// Nothing is told apart above this height, and farther behind or before than that.
 const HIGHEST_M: f64 = 6.0;
 const BEYOND_M: [f64; 2] = [-3.0, 10.0];
@@ -59,7 +53,11 @@ impl Eye {
             .fold([0.0; 2], |sum, [x, y]| [sum[0] + x, sum[1] + y]);
         let rectangle = Rectangle::fit(&self.places_m, None);
         let (columns, above_m) = self.look_at_columns(points, scene);
-        self.look_at_surface(points, scene);
+        self.jumps_m.clear();
+        let jumps_m = points
+            .iter()
+            .filter_map(|point| jump_m(scan, *point as usize));
+        self.jumps_m.extend(jumps_m);
         let mut range_m = 0.0;
         let (mut top, mut floor_m) = (points[0], f32::INFINITY);
         for point in points {
@@ -70,22 +68,18 @@ impl Eye {
                 top = *point;
             }
         }
-        let roughness_m = if self.jumps_m.len() < FEWEST_JUMPS {
-            SMOOTH_M
-        } else {
-            median(&mut self.jumps_m)
-        };
+        let top_m = f64::from(scene.heights_m[top as usize]);
         Some(Appearance {
             features: [
                 libm::log(range_m + 1.0),
                 libm::log(rectangle.length_m + 0.1),
                 libm::log(rectangle.width_m + 0.1),
-                f64::from(scene.heights_m[top as usize]),
-                passed_m(top as usize, range_m, scene).min(HIGHEST_M),
+                top_m,
+                passed_m(scan, top as usize, top_m, range_m).min(HIGHEST_M),
                 f64::from(floor_m),
                 libm::log(f64::from(columns)),
                 above_m.min(HIGHEST_M),
-                libm::log(roughness_m + 0.01),
+                libm::log(median_jump_m(&mut self.jumps_m) + 0.01),
                 libm::log(median(&mut self.depths_m) + 0.02),
                 libm::log(mean_off_edge_m(&self.places_m, &rectangle) + 0.02),
                 median(&mut self.beyond_m).clamp(BEYOND_M[0], BEYOND_M[1]),
@@ -134,24 +128,6 @@ impl Eye {
         }
         (columns, highest_m)
     }
-
-    /// Notes by how much the ranges of neighbours in a layer jump to and fro.
-    fn look_at_surface(&mut self, points: &[u32], scene: &Scene<'_>) {
-        let scan = scene.scan;
-        let ranges_m = scan.range_m();
-        self.jumps_m.clear();
-        for point in points.iter().map(|point| *point as usize) {
-            let (column, layer) = (scan.column(point), scan.layer(point));
-            let [before_m, after_m] = [column + scan.columns() - 1, column + 1]
-                .map(|beside| ranges_m[scan.index(scan.over_seam(beside), layer)]);
-            let here_m = ranges_m[point];
-            let is_near = |other_m: f32| other_m > 0.0 && (other_m - here_m).abs() < EDGE_M;
-            if is_near(before_m) && is_near(after_m) {
-                let jump_m = 0.5 * (before_m + after_m - 2.0 * here_m).abs();
-                self.jumps_m.push(f64::from(jump_m));
-            }
-        }
-    }
 }
 
 impl Appearance {
@@ -164,22 +140,6 @@ impl Appearance {
             sum + share * libm::tanh(inner + bias)
         })
     }
-}
-
-/// Height at which the next ray passed over the top of a cluster; infinite where something hides that,
-/// or no ray is higher.
-fn passed_m(top: usize, range_m: f64, scene: &Scene<'_>) -> f64 {
-    let scan = scene.scan;
-    let layer = scan.layer(top);
-    if layer + 1 == MAX_LAYERS {
-        return f64::INFINITY;
-    }
-    let [own_m, above_m] = [top, top + 1].map(|point| f64::from(scan.range_m()[point]));
-    if above_m > 0.0 && above_m < own_m - OCCLUDER_M {
-        return f64::INFINITY;
-    }
-    let rise = scan.slope(layer + 1).0 - scan.slope(layer).0;
-    f64::from(scene.heights_m[top]) + range_m * rise
 }
 
 /// How far places lie from the nearest edge of the box around them, on average: on a vehicle's sides

@@ -35,6 +35,8 @@ pub(super) struct Candidate {
     velocity_mps: Vector2<f64>,
 }
 
+/// What looks less like a vehicle begins no candidate.
+pub(super) const LEAST_LOG: f64 = -1.5;
 /// Looks that the mean reaches back: later ones are mostly nearer.
 const REACH: f64 = 3.0;
 /// What is added to the mean for the first look and, times its logarithm, for their number: things that
@@ -113,7 +115,7 @@ impl Candidate {
     }
 
     /// That it is a vehicle.
-    pub(super) fn probability(&self) -> f64 {
+    fn probability(&self) -> f64 {
         let looks = f64::from(self.looks.min(MOST_LOOKS));
         let log_odds = self.log_odds + FIRST_LOG + MORE_LOG * libm::log(looks);
         1.0 / (1.0 + libm::exp(-log_odds))
@@ -147,6 +149,3 @@ impl Candidate {
 pub(super) fn may_begin(sighting: &Sighting, parameters: &TrackParameters) -> bool {
     sighting.log_odds > LEAST_LOG && sighting.look.top_m > parameters.lowest_object_m
 }
-
-/// What looks less like a vehicle begins no candidate.
-pub(super) const LEAST_LOG: f64 = -1.5;

@@ -24,9 +24,9 @@ use super::sight::Sight;
 use super::spots::Spot;
 use super::{Object, Scene, TrackParameters};
 use crate::cluster::Clusters;
-use crate::ego::{Pose, wrapped_rad};
+use crate::ego::wrapped_rad;
 use crate::geometry::{Outline, Rectangle};
-use crate::time::{Span, Time};
+use crate::time::Time;
 use appearance::{Appearance, Eye};
 use candidate::{Candidate, LEAST_LOG, Sighting, may_begin};
 
@@ -84,18 +84,18 @@ impl Standing {
         self.lost.clear();
     }
 
-    /// The frame changed: what was at `from` is now at `to`.
-    pub(super) fn reframe(&mut self, from: &Pose, to: &Pose) {
-        let (old, new) = (from.placement(), to.placement());
-        let turn_rad = wrapped_rad(to.yaw_rad - from.yaw_rad);
-        let rise_m = to.position_m[2] - from.position_m[2];
-        let moved = |at| new.local_m(old.sensor_m(at));
+    pub(super) fn reframe(
+        &mut self,
+        turn_rad: f64,
+        moved: impl Fn([f64; 2]) -> [f64; 2] + Copy,
+        rise_m: f64,
+    ) {
         for candidate in &mut self.candidates {
             candidate.reframe(turn_rad, moved, rise_m);
         }
         for lost in &mut self.lost {
             lost.place.centre_m = moved(lost.place.centre_m);
-            lost.place.yaw_rad += turn_rad;
+            lost.place.yaw_rad = wrapped_rad(lost.place.yaw_rad + turn_rad);
         }
     }
 
@@ -113,7 +113,7 @@ impl Standing {
         parameters: &TrackParameters,
     ) {
         let end = scene.scan.time();
-        self.predict(scene, end);
+        self.predict(scene);
         self.take_sightings(clusters, scene);
         self.pair();
         self.update(scene, end);
@@ -121,15 +121,15 @@ impl Standing {
         self.tidy(end, parameters);
     }
 
-    fn predict(&mut self, scene: &Scene<'_>, end: Time) {
-        let placement = scene.sweep.sensor.placement();
+    /// Every candidate to the time at which the sensor passed over its place, and where it is then.
+    fn predict(&mut self, scene: &Scene<'_>) {
         for candidate in &mut self.candidates {
-            let [x, y] = placement.sensor_m(candidate.track.position_m().into());
-            let age_s = scene.scan.age_s(scene.scan.column_at(libm::atan2(x, y)));
-            candidate.track.predict(end + Span::from_seconds(-age_s));
+            let passed_at = scene.passed_at(candidate.track.position_m());
+            candidate.track.predict(passed_at);
         }
         self.places.clear();
-        self.reaches.begin(placement.origin_m().into());
+        let origin_m = scene.sweep.sensor.placement().origin_m();
+        self.reaches.begin(origin_m.into());
         for candidate in &self.candidates {
             let place = candidate.place();
             let reach_m = place.radius_m() + 2.0 * BESIDE_M;
@@ -299,13 +299,13 @@ impl Standing {
     ) {
         let listed = objects.len();
         for candidate in &mut self.candidates {
+            if !candidate.is_known() {
+                continue;
+            }
+            let mut object = candidate.track.object(end);
             let place = candidate.place();
             let is_other = |other: &Object| is_one_place(&place, &other.rectangle());
-            let existence = candidate.track.object(end).existence;
-            if !candidate.is_known()
-                || existence < least_confidence
-                || objects[..listed].iter().any(is_other)
-            {
+            if object.existence < least_confidence || objects[..listed].iter().any(is_other) {
                 continue;
             }
             let track = &mut candidate.track;
@@ -329,7 +329,8 @@ impl Standing {
                     (None, None) => take_next(next_id),
                 };
             }
-            objects.push(track.object(end));
+            object.id = track.id;
+            objects.push(object);
         }
     }
 }
@@ -427,6 +428,20 @@ mod tests {
             ..CAR[0]
         }]);
         assert!((0..6).all(|_| street.see(&wall, &mut [], &[]).is_empty()));
+    }
+
+    #[test]
+    fn what_drives_by_is_not_listed_though_it_looks_like_a_car() {
+        let mut street = Street::new();
+        let looks = (0..8).map(|revolution| {
+            let gone_m = 0.6 * f64::from(revolution);
+            let moved = CAR.map(|block| Block {
+                middle_m: [block.middle_m[0], block.middle_m[1] + gone_m],
+                ..block
+            });
+            street.see(&scan_of_blocks(&moved), &mut [], &[]).len()
+        });
+        assert_eq!(looks.sum::<usize>(), 0);
     }
 
     #[test]
