@@ -114,12 +114,15 @@ fn process_gives_the_same_bytes_twice_and_one_list_a_revolution() {
             &name("jsonl"),
             "--labels",
             &name("npz"),
+            "--appearances",
+            &name("looks.npz"),
         ];
         assert_eq!(code(&kreisel(&arguments)), 0);
-        ["rec", "jsonl", "npz"].map(|what| std::fs::read(name(what)).unwrap())
+        ["rec", "jsonl", "npz", "looks.npz"].map(|what| std::fs::read(name(what)).unwrap())
     };
     let (first, second) = (process(1), process(2));
     assert!(first == second, "two runs differ");
+    assert!(first[3].starts_with(b"PK"));
 
     let envelopes = payloads(&first[0]);
     let lists: Vec<ObjectList> = envelopes

@@ -37,7 +37,7 @@ pub(super) struct Candidate {
 
 /// What looks less like a vehicle begins no candidate.
 pub(super) const LEAST_LOG: f64 = -1.5;
-/// Looks that the mean reaches back: later ones are mostly nearer.
+/// Looks that the mean reaches back: later ones are mostly nearer, and a single one may be of any part.
 const REACH: f64 = 3.0;
 /// What is added to the mean for the first look and, times its logarithm, for their number: things that
 /// only look like a vehicle for a moment are more than vehicles. Fitted once by logistic regression on
