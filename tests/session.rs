@@ -466,7 +466,7 @@ fn the_examples_print_what_a_daemon_sends() {
         demo.output();
         example.signal(Signal::SIGTERM);
         let (_, shown, log) = example.output();
-        assert!(shown.contains("revolution 40: 7 objects"), "{shown}{log}");
+        assert!(shown.contains("revolution 50: 7 objects"), "{shown}{log}");
         assert!(shown.contains("  pedestrian "), "{shown}{log}");
     });
 }
