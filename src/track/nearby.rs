@@ -3,6 +3,7 @@
 use multiversion::multiversion;
 use nalgebra::Vector2;
 
+use crate::geometry::{Outline, Rectangle};
 use crate::marks::marked;
 
 /// Discs in the plane, by their numbers. Most are far from any place that is asked for, and are
@@ -15,6 +16,13 @@ pub(super) struct Discs {
     y_m: Vec<f32>,
     radius_m: Vec<f32>,
     marks: Vec<bool>,
+}
+
+/// Boxes by their numbers, each found near as much around it as it was given.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Places {
+    boxes: Vec<(Rectangle, Outline)>,
+    reaches: Discs,
 }
 
 /// What single precision may be off within the range of a sensor.
@@ -60,6 +68,39 @@ impl Discs {
     pub(super) fn near(&mut self, at_m: Vector2<f64>) -> impl Iterator<Item = usize> + use<'_> {
         let at_m = self.relative_m(at_m);
         self.near_box(at_m, at_m)
+    }
+}
+
+impl Places {
+    /// Forgets all of them; as [`Discs::begin`].
+    pub(super) fn begin(&mut self, origin_m: Vector2<f64>) {
+        self.boxes.clear();
+        self.reaches.begin(origin_m);
+    }
+
+    /// Adds a box that is found from `more_m` beyond its corners.
+    pub(super) fn push(&mut self, place: Rectangle, more_m: f64) {
+        let reach_m = place.radius_m() + more_m;
+        self.reaches.push(place.centre_m.into(), reach_m);
+        self.boxes.push((place, place.outline()));
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.boxes.len()
+    }
+
+    pub(super) fn rectangle(&self, number: usize) -> &Rectangle {
+        &self.boxes[number].0
+    }
+
+    /// All that may reach a place, by their numbers; as [`Discs::near`].
+    pub(super) fn near(
+        &mut self,
+        at_m: Vector2<f64>,
+    ) -> impl Iterator<Item = (usize, &(Rectangle, Outline))> {
+        let boxes = &self.boxes;
+        let near = self.reaches.near(at_m);
+        near.map(move |number| (number, &boxes[number]))
     }
 }
 

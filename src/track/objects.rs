@@ -7,7 +7,7 @@ use nalgebra::Vector2;
 
 use super::assignment::{Assigner, Candidate};
 use super::grouping::Grouping;
-use super::nearby::Discs;
+use super::nearby::Places;
 use super::road_user::Track;
 use super::sight::Sight;
 use super::spots::Spot;
@@ -15,7 +15,7 @@ use super::standing::{FEATURES, Standing};
 use super::{Object, Scene, TrackParameters};
 use crate::cluster::Clusters;
 use crate::ego::{Pose, wrapped_rad};
-use crate::geometry::{Outline, Rectangle};
+use crate::geometry::Rectangle;
 use crate::time::Time;
 
 /// Tracks of road users.
@@ -37,8 +37,7 @@ pub(super) struct ObjectTracker {
     /// Pairs each track with a group.
     assigner: Assigner,
     /// Places of the tracks, and how far they reach.
-    places: Vec<(Rectangle, Outline)>,
-    reaches: Discs,
+    places: Places,
     /// How likely each track exists, and whether it is no road user.
     odds: Vec<f64>,
     background: Vec<bool>,
@@ -143,18 +142,14 @@ impl ObjectTracker {
 
     /// Takes over where the tracks are, each with what `more_m` lets it reach beyond its box.
     fn take_places(&mut self, origin_m: Vector2<f64>, more_m: impl Fn(&Track) -> f64) {
-        self.places.clear();
-        self.reaches.begin(origin_m);
+        self.places.begin(origin_m);
         self.add_places(more_m);
     }
 
     /// The same for the tracks that were added since then.
     fn add_places(&mut self, more_m: impl Fn(&Track) -> f64) {
         for track in &self.tracks[self.places.len()..] {
-            let place = track.rectangle();
-            let reach_m = place.radius_m() + more_m(track);
-            self.reaches.push(place.centre_m.into(), reach_m);
-            self.places.push((place, place.outline()));
+            self.places.push(track.rectangle(), more_m(track));
         }
     }
 
@@ -176,9 +171,8 @@ impl ObjectTracker {
                 add(owner, self.tracks[owner].cost(spots, &group.look));
             }
             let middle_m = group.look.middle_m;
-            for row in self.reaches.near(middle_m) {
+            for (row, (_, outline)) in self.places.near(middle_m) {
                 let track = &self.tracks[row];
-                let (_, outline) = &self.places[row];
                 if track.rests() || group.claimed_by == Some(row) {
                     continue;
                 }
@@ -240,9 +234,9 @@ impl ObjectTracker {
             }
             let middle_m = group.look.middle_m;
             let is_new = group.look.is_new();
-            let is_piece = self.reaches.near(middle_m).any(|number| {
+            let is_piece = self.places.near(middle_m).any(|(number, (_, outline))| {
                 let is_before = is_new && self.tracks[number].is_background();
-                !is_before && self.places[number].1.contains(middle_m.into())
+                !is_before && outline.contains(middle_m.into())
             });
             let spots = self.grouping.spots(group);
             // Of a vehicle that is far away a single layer may show the bumper.
@@ -286,7 +280,7 @@ impl ObjectTracker {
         self.background.clear();
         self.background
             .extend(self.tracks.iter().map(Track::is_background));
-        let (places, odds, reaches) = (&self.places, &self.odds, &mut self.reaches);
+        let (places, odds) = (&mut self.places, &self.odds);
         let background = &self.background;
         let mut number = 0;
         let dropped = self.tracks.extract_if(.., |_| {
@@ -295,14 +289,15 @@ impl ObjectTracker {
             if odds[own] == GONE {
                 return true;
             }
-            let centre_m = places[own].0.centre_m;
-            reaches.near(centre_m.into()).any(|other| {
-                let is_better = (odds[other], Reverse(other)) > (odds[own], Reverse(own));
-                let (place, outline) = &places[other];
-                let depth_m = 0.3 * place.width_m.min(1.6);
-                let is_before = background[other] && !background[own];
-                is_better && !is_before && outline.distance_m(centre_m) < -depth_m
-            })
+            let centre_m = places.rectangle(own).centre_m;
+            places
+                .near(centre_m.into())
+                .any(|(other, (place, outline))| {
+                    let is_better = (odds[other], Reverse(other)) > (odds[own], Reverse(own));
+                    let depth_m = 0.3 * place.width_m.min(1.6);
+                    let is_before = background[other] && !background[own];
+                    is_better && !is_before && outline.distance_m(centre_m) < -depth_m
+                })
         });
         self.lost.retain(|track| track.may_return(end));
         self.lost
@@ -313,20 +308,20 @@ impl ObjectTracker {
         self.objects.clear();
         let least = parameters.least_confidence;
         let is_due = |track: &Track| {
-            let may_be = !track.is_published && track.most_confidence() >= least;
+            let may_be = !track.was_likely && track.most_confidence() >= least;
             may_be && track.object(end).existence >= least
         };
         let mut number = 0;
         while number < self.tracks.len() {
             if is_due(&self.tracks[number]) {
                 number = self.reunite(number);
-                self.tracks[number].is_published = true;
+                self.tracks[number].was_likely = true;
             }
             number += 1;
         }
         self.standing.give_way(&mut self.tracks);
         for track in &mut self.tracks {
-            let may_be = track.is_published && !track.is_left_standing();
+            let may_be = track.was_likely && !track.is_left_standing();
             if may_be && track.most_confidence() >= least {
                 let object = track.object(end);
                 if object.existence >= least {
@@ -469,7 +464,7 @@ mod tests {
         let spots = spots_of(&scan);
         let track = |id: u32, spots: &[Spot]| track_of(id, spots, &scan);
         let mut first = track(7, &spots[..spots.len() / 3]);
-        first.is_published = true;
+        first.was_likely = true;
         let mut tracker = ObjectTracker {
             tracks: vec![first, track(8, &spots)],
             ..ObjectTracker::default()
@@ -561,7 +556,7 @@ mod tests {
         let track = |id: u32, spots: &[Spot]| track_of(id, spots, &scan);
         let claimed = |is_known: bool, piece: &[Spot]| {
             let mut whole = track(7, &spots);
-            whole.is_published = is_known;
+            whole.was_likely = is_known;
             let piece = track(8, piece);
             let is_vehicle = piece.is_vehicle();
             let mut tracker = ObjectTracker {

@@ -44,7 +44,7 @@ impl Strays {
         self.note_seen(tracks.len(), spots);
         for (number, track) in tracks.iter().enumerate() {
             // Of structure, of which there is much, strays would show another piece in each revolution.
-            let is_known = track.is_published || track.has_moved();
+            let is_known = track.was_likely || track.has_moved();
             if !is_known || !track.is_confirmed() || !track.is_sparse() {
                 continue;
             }
@@ -161,7 +161,7 @@ mod tests {
             spots.len()
         };
         assert_eq!(strays(&track), 0);
-        track.is_published = true;
+        track.was_likely = true;
         assert_eq!(strays(&track), own.len());
     }
 

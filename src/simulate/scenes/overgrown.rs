@@ -1,8 +1,7 @@
 //! A street among gardens: what stands behind parked vehicles is ragged, close, and hangs over them.
 
-use super::strangers::{add_column, between, parked, pick, stand_at_kerb};
+use super::strangers::{add_column, along_the_street, between, parked, pick, stand_at_kerb};
 use crate::random::Random;
-use crate::simulate::path::Path;
 use crate::simulate::scenario::{PoseMessages, Scene};
 use crate::simulate::scenery::Scenery;
 use crate::simulate::terrain::{Swell, Terrain};
@@ -72,9 +71,7 @@ pub(super) fn overgrown(random: &mut Random) -> Scene {
     add_column(random, &mut actors, speed_mps);
     Scene {
         sensor_height_m: between(random, 1.5, 2.2),
-        ego: Path::from([1.75, 0.0], 90.0)
-            .line(400.0)
-            .timed(&[(0.0, speed_mps), (100.0, speed_mps)]),
+        ego: along_the_street(speed_mps),
         poses: PoseMessages::None,
         actors,
         scenery,

@@ -102,15 +102,20 @@ fn build(random: &mut Random, with_road_users: bool) -> Scene {
     }
     Scene {
         sensor_height_m: between(random, 1.2, 2.6),
-        ego: Path::from([1.75, 0.0], 90.0)
-            .line(400.0)
-            .timed(&[(0.0, speed_mps), (100.0, speed_mps)]),
+        ego: along_the_street(speed_mps),
         poses: PoseMessages::None,
         actors,
         scenery,
         terrain,
         range_deviation_m: between(random, 0.008, 0.03),
     }
+}
+
+/// The way of the sensor's vehicle, north in its lane, at one speed.
+pub(super) fn along_the_street(speed_mps: f64) -> Path {
+    Path::from([1.75, 0.0], 90.0)
+        .line(400.0)
+        .timed(&[(0.0, speed_mps), (100.0, speed_mps)])
 }
 
 fn is_long_near(actor: &Actor, [x, y]: [f64; 2]) -> bool {

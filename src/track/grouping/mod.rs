@@ -193,12 +193,12 @@ impl Grouping {
         let middle_m = patch.bounds.middle_m();
         let is_known_vehicle = |track: &usize| {
             let vehicle = &tracks[*track];
-            vehicle.is_published && vehicle.is_vehicle() && forecasts.of(*track).reaches(middle_m)
+            vehicle.was_likely && vehicle.is_vehicle() && forecasts.of(*track).reaches(middle_m)
         };
         if self.near.iter().any(is_known_vehicle) {
             // Pieces of it are no vehicles; who stands beside it is somebody.
             self.near
-                .retain(|track| tracks[*track].is_published || !tracks[*track].is_vehicle());
+                .retain(|track| tracks[*track].was_likely || !tracks[*track].is_vehicle());
         }
     }
 

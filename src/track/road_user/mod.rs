@@ -93,7 +93,7 @@ pub(super) struct Track {
     /// Where and how fast it was when it was last seen clearly.
     parted: Parting,
     /// Whether it was likely enough once to be listed.
-    pub(super) is_published: bool,
+    pub(super) was_likely: bool,
     /// Whether others know its id.
     pub(super) is_listed: bool,
     /// Whether it is not looked at now.
@@ -145,7 +145,7 @@ impl Track {
             is_hidden: false,
             floor_z_m,
             parted: Parting::default(),
-            is_published: false,
+            was_likely: false,
             is_listed: false,
             rests: false,
             turn: 0,
@@ -269,7 +269,7 @@ impl Track {
 
     /// Whether it may turn out to be a piece of something.
     pub(super) fn is_young(&self, now: Time) -> bool {
-        !self.is_published && !self.rests && (now - self.first_seen).seconds() < YOUNG_S
+        !self.was_likely && !self.rests && (now - self.first_seen).seconds() < YOUNG_S
     }
 
     /// Whether it stands and is rather no road user: what comes before it is none of it.

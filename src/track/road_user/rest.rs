@@ -35,7 +35,7 @@ impl Track {
         let is_known = self.is_confirmed() && (end - self.first_seen).seconds() > KNOWN_S;
         let was_there = self.points > 0;
         let stands = !self.moves && self.motion.standing() > 0.5;
-        let is_hardly = !self.is_published && self.most_confidence() < HARDLY * least_confidence;
+        let is_hardly = !self.was_likely && self.most_confidence() < HARDLY * least_confidence;
         is_known && was_there && stands && is_hardly
     }
 }
@@ -74,7 +74,7 @@ mod tests {
         assert_eq!(rests(track.clone(), end, 0.4, much), 0);
         assert_eq!(rests(track.clone(), end, 0.1, none), 0);
         let published = Track {
-            is_published: true,
+            was_likely: true,
             ..track.clone()
         };
         let moving = Track {

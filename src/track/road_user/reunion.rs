@@ -178,7 +178,7 @@ impl Parting {
 impl Track {
     /// Whether it may come back at a time, and is then worth an old id.
     pub(in crate::track) fn may_return(&self, now: Time) -> bool {
-        self.is_published && (now - self.last_measured).seconds() <= LONGEST_S
+        self.was_likely && (now - self.last_measured).seconds() <= LONGEST_S
     }
 
     /// How far this new track is from where one that is not seen any more would be by now;
@@ -205,7 +205,7 @@ impl Track {
 
     /// Whether nothing or hardly anything is seen of it, though others know it.
     pub(in crate::track) fn is_missed(&self) -> bool {
-        self.is_published && (self.points == 0 || self.parted.at < self.last_measured)
+        self.was_likely && (self.points == 0 || self.parted.at < self.last_measured)
     }
 
     /// Whether it stands in the place of a known one of which less is seen: both are one.
@@ -218,7 +218,7 @@ impl Track {
             && !seen.goes_together_with(&parted, gap_s);
         let are_in_one_place =
             || own.outline().contains(other.centre_m) || other.outline().contains(own.centre_m);
-        known.is_published
+        known.was_likely
             && known.is_vehicle() == self.is_vehicle()
             && (known.points as f64) < CLEAR * self.points as f64
             && self.shape.seen_m[0] <= other.length_m + GROWTH_M
@@ -258,7 +258,7 @@ impl Track {
         if lost.belief.road_user() > self.belief.road_user() {
             self.belief = lost.belief;
         }
-        self.is_published = true;
+        self.was_likely = true;
     }
 }
 
@@ -357,7 +357,7 @@ mod tests {
         let look = |spots: &[Spot]| Look::at(spots, &scan, Vector2::zeros());
         let (mut outline, begin) = (vec![], scan.time());
         let mut track = Track::new(1, false, &spots, &look(&spots), begin, 0.0, &mut outline);
-        track.is_published = true;
+        track.was_likely = true;
         let mut is_missed_after = |count: usize, revolution: u32| {
             let end = begin + Span::from_seconds(0.1 * f64::from(revolution));
             let seen = &spots[..count];
@@ -504,7 +504,7 @@ mod tests {
         let seen = track_at(2, at(0.0), 0.3);
         known.points = 9;
         assert!(!seen.replaces(&known), "nobody knows it");
-        known.is_published = true;
+        known.was_likely = true;
         assert!(seen.replaces(&known));
         known.points = seen.points;
         assert!(!seen.replaces(&known));

@@ -46,9 +46,9 @@ const FIRST_LOG: f64 = -1.5;
 const MORE_LOG: f64 = 0.4;
 /// More looks say nothing new.
 const MOST_LOOKS: u32 = 20;
-/// Now one part of what stands is seen and now another, but seen from its first look on it stays where it is; what
-/// went on faster drives. Without, a car that comes round the island is listed as one that stands, of another
-/// identity (`tests/roundabout.rs`).
+/// What went on faster since its first look drives; of what stands another part is seen at every look, but it gets
+/// nowhere. Without, a car that comes round the island is listed as one that stands, of another identity
+/// (`tests/roundabout.rs`).
 const FASTEST_MPS: f64 = 3.5;
 /// Looks after which it may be listed.
 const FEWEST_LOOKS: u32 = 3;

@@ -16,7 +16,7 @@ pub use appearance::FEATURES;
 use nalgebra::Vector2;
 
 use super::look::Look;
-use super::nearby::Discs;
+use super::nearby::Places;
 use super::objects::floor_z_m;
 use super::placing::Placing;
 use super::road_user::Track;
@@ -25,7 +25,7 @@ use super::spots::Spot;
 use super::{Object, Scene, TrackParameters};
 use crate::cluster::Clusters;
 use crate::ego::wrapped_rad;
-use crate::geometry::{Outline, Rectangle};
+use crate::geometry::Rectangle;
 use crate::time::Time;
 use appearance::{Appearance, Eye};
 use candidate::{Candidate, LEAST_LOG, Sighting, may_begin};
@@ -37,8 +37,7 @@ pub(super) struct Standing {
     /// Those that were listed and of which nothing is left.
     lost: Vec<Lost>,
     /// Where the candidates are expected, and how far a cluster of theirs may be.
-    places: Vec<(Rectangle, Outline)>,
-    reaches: Discs,
+    places: Places,
     eye: Eye,
     /// Of every cluster what it looks like, if it is not too small.
     appearances: Vec<Option<Appearance>>,
@@ -129,14 +128,10 @@ impl Standing {
             let passed_at = scene.passed_at(candidate.track.position_m());
             candidate.track.predict(passed_at);
         }
-        self.places.clear();
         let origin_m = scene.sweep.sensor.placement().origin_m();
-        self.reaches.begin(origin_m.into());
+        self.places.begin(origin_m.into());
         for candidate in &self.candidates {
-            let place = candidate.place();
-            let reach_m = place.radius_m() + 2.0 * BESIDE_M;
-            self.reaches.push(place.centre_m.into(), reach_m);
-            self.places.push((place, place.outline()));
+            self.places.push(candidate.place(), 2.0 * BESIDE_M);
         }
     }
 
@@ -158,7 +153,7 @@ impl Standing {
             let [x, y] = appearance.middle_m;
             let middle_m = placement.local_m([x, y]);
             let may_be = log_odds > LEAST_LOG && libm::hypot(x, y) < FARTHEST_M;
-            if !may_be && self.reaches.near(middle_m.into()).next().is_none() {
+            if !may_be && self.places.near(middle_m.into()).next().is_none() {
                 continue;
             }
             let begin = self.spots.len();
@@ -181,8 +176,7 @@ impl Standing {
         self.pairs.clear();
         for (sighting, seen) in self.sightings.iter().enumerate() {
             let middle_m = seen.look.middle_m;
-            for candidate in self.reaches.near(middle_m) {
-                let (place, outline) = &self.places[candidate];
+            for (candidate, (place, outline)) in self.places.near(middle_m) {
                 if outline.distance_m(middle_m.into()) < BESIDE_M {
                     let apart_m = (middle_m - Vector2::from(place.centre_m)).norm();
                     self.pairs.push(Pair {
@@ -463,7 +457,7 @@ mod tests {
         let car = scan_of_blocks(&CAR);
         let mut street = Street::new();
         let (mut rested, _) = crate::track::tests::followed([&car]);
-        (rested.id, rested.is_published, rested.is_listed) = (3, true, true);
+        (rested.id, rested.was_likely, rested.is_listed) = (3, true, true);
         rested.stand_as_vehicle(1.0);
         let mut tracks = [rested];
         let last = |street: &mut Street, tracks: &mut [Track]| {
