@@ -139,15 +139,23 @@ fn what_is_written_again_is_read_as_the_same_roads() {
     }
 }
 
+fn archive_of(name: &str, content: &[u8]) -> Vec<u8> {
+    let mut archive = rawzip::ZipArchiveWriter::new(vec![]);
+    let (mut entry, config) = archive.new_file(name).start().unwrap();
+    let mut writer = config.wrap(&mut entry);
+    writer.write_all(content).unwrap();
+    let (_, sizes) = writer.finish().unwrap();
+    entry.finish(sizes).unwrap();
+    archive.finish().unwrap()
+}
+
 #[test]
 fn what_is_no_map_is_one_line_with_file_and_place() {
     let folder = tempfile::tempdir().unwrap();
-    let mut archive = zip::ZipWriter::new(std::io::Cursor::new(vec![]));
-    archive
-        .start_file("readme.txt", zip::write::SimpleFileOptions::default())
-        .unwrap();
-    archive.write_all(b"none").unwrap();
-    let archive = archive.finish().unwrap().into_inner();
+    let archive = archive_of("readme.txt", b"none");
+    let mut damaged = archive_of("scenario.scn", b"SCENARIO");
+    let content = damaged.windows(8).position(|bytes| bytes == b"SCENARIO");
+    damaged[content.unwrap()] ^= 1;
     for (name, bytes, expected) in [
         (
             "empty.scn",
@@ -174,6 +182,7 @@ fn what_is_no_map_is_one_line_with_file_and_place() {
             archive.clone(),
             "an archive without scenario.scn",
         ),
+        ("damaged.scnx", damaged, "scenario.scn in the archive: "),
     ] {
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();

@@ -4,8 +4,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
-use zip::ZipWriter;
-use zip::write::SimpleFileOptions;
+use rawzip::ZipArchiveWriter;
 
 use super::files::Output;
 
@@ -13,7 +12,7 @@ use super::files::Output;
 #[derive(Debug)]
 pub(super) struct Archive {
     path: PathBuf,
-    zip: ZipWriter<Output>,
+    zip: ZipArchiveWriter<Output>,
 }
 
 /// A number as numpy names it.
@@ -46,7 +45,7 @@ impl Archive {
     pub(super) fn create(path: &Path) -> Result<Self> {
         Ok(Self {
             path: path.into(),
-            zip: ZipWriter::new(Output::create(path)?),
+            zip: ZipArchiveWriter::new(Output::create(path)?),
         })
     }
 
@@ -61,12 +60,17 @@ impl Archive {
         for element in elements {
             element.put(&mut array);
         }
-        let options = SimpleFileOptions::default().large_file(array.len() > u32::MAX as usize);
-        let result = self.zip.start_file(format!("{name}.npy"), options);
-        result
-            .map_err(Into::into)
-            .and_then(|()| self.zip.write_all(&array))
+        self.add(&format!("{name}.npy"), &array)
             .with_context(|| self.path.display().to_string())
+    }
+
+    fn add(&mut self, name: &str, content: &[u8]) -> Result<()> {
+        let (mut entry, config) = self.zip.new_file(name).start()?;
+        let mut writer = config.wrap(&mut entry);
+        writer.write_all(content)?;
+        let (_, sizes) = writer.finish()?;
+        entry.finish(sizes)?;
+        Ok(())
     }
 
     pub(super) fn finish(self) -> Result<()> {

@@ -1,9 +1,10 @@
 //! Maps of roads as files: which format it is, is found from the bytes.
 
-use std::io::{Cursor, Read as _};
 use std::path::Path;
 
 use anyhow::{Context as _, Result, anyhow, bail};
+use miniz_oxide::inflate::{TINFLStatus, decompress_to_vec_with_limit};
+use rawzip::{CompressionMethod, ZipArchive};
 
 use super::files;
 use crate::config::Configuration;
@@ -12,7 +13,7 @@ use crate::parameter::Text;
 use crate::roadmap::{Origin, Roadmap, osm, roundabouts, scn};
 
 /// What a scenario archive's text may grow to: a map of a city has a tenth.
-const LARGEST_SCENARIO: u64 = 256 << 20;
+const LARGEST_SCENARIO: usize = 256 << 20;
 /// The scenario in an archive.
 const SCENARIO_NAME: &str = "scenario.scn";
 
@@ -52,25 +53,42 @@ fn scenario(text: &str, origin: Option<Geodetic>) -> Result<Roadmap> {
 }
 
 fn unpacked(bytes: &[u8]) -> Result<String> {
-    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).context("a damaged archive")?;
-    let names: Vec<String> = archive
-        .file_names()
-        .filter_map(|name| Some(name.ok()?.into_owned()))
-        .filter(|name| name.to_lowercase().ends_with(".scn"))
-        .collect();
-    let usual = names.iter().find(|&name| name == SCENARIO_NAME);
-    let name = usual
-        .or(names.first())
-        .ok_or_else(|| anyhow!("an archive without {SCENARIO_NAME}"))?;
-    let file = archive.by_name(name).with_context(|| name.clone())?;
-    let mut content = vec![];
-    file.take(LARGEST_SCENARIO + 1)
-        .read_to_end(&mut content)
-        .with_context(|| format!("{name} in the archive"))?;
-    if content.len() as u64 > LARGEST_SCENARIO {
-        bail!("{name} in the archive is larger than {LARGEST_SCENARIO} bytes");
+    let damaged = "a damaged archive";
+    let archive = ZipArchive::from_slice(bytes).context(damaged)?;
+    let (mut entries, mut found) = (archive.entries(), None);
+    while let Some(entry) = entries.next_entry().context(damaged)? {
+        let name = String::from_utf8_lossy(entry.file_path().as_bytes()).into_owned();
+        let is_usual = name == SCENARIO_NAME;
+        if is_usual || (found.is_none() && name.to_lowercase().ends_with(".scn")) {
+            found = Some((name, entry));
+        }
+        if is_usual {
+            break;
+        }
     }
+    let (name, entry) = found.ok_or_else(|| anyhow!("an archive without {SCENARIO_NAME}"))?;
+    let in_archive = || format!("{name} in the archive");
+    let packed = archive
+        .get_entry(entry.wayfinder())
+        .with_context(in_archive)?;
+    let content = match entry.compression_method() {
+        CompressionMethod::STORE => packed.data().to_vec(),
+        CompressionMethod::DEFLATE => inflated(packed.data()).with_context(in_archive)?,
+        other => bail!(
+            "{} is compressed by {other:?}, which is not read",
+            in_archive()
+        ),
+    };
+    let mut verified = packed.verifying_reader(content.as_slice());
+    std::io::copy(&mut verified, &mut std::io::sink()).with_context(in_archive)?;
     Ok(String::from_utf8_lossy(&content).into_owned())
+}
+
+fn inflated(packed: &[u8]) -> Result<Vec<u8>> {
+    decompress_to_vec_with_limit(packed, LARGEST_SCENARIO).map_err(|error| match error.status {
+        TINFLStatus::HasMoreOutput => anyhow!("larger than {LARGEST_SCENARIO} bytes"),
+        status => anyhow!("damaged: {status:?}"),
+    })
 }
 
 /// The roads that a configuration names, if it does; a map on the command line takes its place.

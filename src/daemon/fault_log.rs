@@ -24,10 +24,7 @@ impl FaultLog {
     /// Logs a fault, or counts it for the next line of its kind.
     pub(super) fn note(&mut self, name: &'static str, text: impl FnOnce() -> String) {
         if let Some(since) = self.due(name, Instant::now()) {
-            match since {
-                0 => warn!("{name}: {}", text()),
-                _ => warn!("{name}: {} ({since} more since the last line)", text()),
-            }
+            log(name, &text(), since);
         }
     }
 
@@ -50,6 +47,13 @@ impl FaultLog {
                 Some(since)
             }
         }
+    }
+}
+
+fn log(name: &str, text: &str, since: u64) {
+    match since {
+        0 => warn!("{name}: {text}"),
+        _ => warn!("{name}: {text} ({since} more since the last line)"),
     }
 }
 
