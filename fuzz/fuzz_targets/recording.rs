@@ -1,7 +1,9 @@
-//! Any bytes as a recording: entries and damage follow each other without gap or overlap to the end.
+//! Any bytes as a recording: entries and damage follow each other without gap or overlap to the end. As a capture: its frames
+//! follow each other, and packets lie within them.
 #![no_main]
 
 use kreisel::wire::Recording;
+use kreisel::wire::capture::{Frames, udp};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
@@ -16,4 +18,14 @@ fuzz_target!(|bytes: &[u8]| {
         end = offset + length;
     }
     assert_eq!(end, bytes.len());
+
+    let mut end = 0;
+    for frame in Frames::new(bytes).into_iter().flatten().flatten() {
+        assert!(frame.offset >= end);
+        end = frame.offset + frame.bytes.len();
+        assert!(end <= bytes.len());
+        if let Ok(Some(packet)) = udp::packet(&frame) {
+            assert!(packet.payload.len() < frame.bytes.len());
+        }
+    }
 });

@@ -4,43 +4,17 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use etherparse::{LaxNetSlice, LaxSlicedPacket, NetSlice, SlicedPacket, TransportSlice};
-use pcap_parser::traits::PcapNGPacketBlock as _;
-use pcap_parser::{Block, Linktype, PcapBlockOwned, PcapError, create_reader};
+use indicatif::ProgressBar;
 
 use super::Completion;
 use super::files::progress;
-use crate::time::Time;
+use crate::wire::capture::{CaptureError, Captured, Frames, udp};
 use crate::wire::envelope::Postmark;
 use crate::wire::point_cloud::POINT_CLOUD_ID;
 use crate::wire::velodyne::captured::SensorPackets;
 use crate::wire::velodyne::data::{self, BLOCKS, DataPacket, ReturnMode};
 use crate::wire::velodyne::device_service::SweepAssembler;
 use crate::wire::velodyne::{Packet, position};
-
-/// Largest record that is read; a jumbo frame has 9 kB.
-const LARGEST_RECORD: usize = 1 << 20;
-
-/// What begins a capture: pcap in both byte orders and both resolutions, and pcapng.
-const MAGICS: [[u8; 4]; 5] = [
-    [0xa1, 0xb2, 0xc3, 0xd4],
-    [0xd4, 0xc3, 0xb2, 0xa1],
-    [0xa1, 0xb2, 0x3c, 0x4d],
-    [0x4d, 0x3c, 0xb2, 0xa1],
-    [0x0a, 0x0d, 0x0d, 0x0a],
-];
-
-/// Whether bytes are those of a capture.
-pub(super) fn is_capture(bytes: &[u8]) -> bool {
-    MAGICS.iter().any(|magic| bytes.starts_with(magic))
-}
-
-/// One captured frame.
-struct Captured<'a> {
-    time: Time,
-    link: Linktype,
-    bytes: &'a [u8],
-}
 
 /// The packets of sensors in a capture, in order.
 #[derive(Default)]
@@ -51,7 +25,7 @@ pub(super) struct Capture {
     /// Frames that are not whole.
     cut: u64,
     /// What ended it early, if anything did.
-    damage: Option<String>,
+    damage: Option<CaptureError>,
 }
 
 impl Capture {
@@ -61,32 +35,44 @@ impl Capture {
     /// When there is no data packet of a VLP-16 in it.
     pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Self> {
         let (mut capture, bar) = (Self::default(), progress(bytes.len(), "bytes"));
-        capture.damage = walk(bytes, |offset, captured| {
-            bar.set_position(offset as u64);
-            capture.take(&captured);
-        });
+        capture.damage = capture.take_all(bytes, &bar).err();
         bar.finish_and_clear();
         if capture.data_packets == 0 {
-            let nothing = || "byte 0: no VLP-16 data packets".into();
-            let problem = capture.damage.unwrap_or_else(nothing);
+            let problem = capture.damage.map(|problem| problem.to_string());
+            let problem = problem.unwrap_or_else(|| "byte 0: no VLP-16 data packets".into());
             bail!("{}: {problem}", path.display());
         }
         Ok(capture)
     }
 
-    fn take(&mut self, captured: &Captured<'_>) {
-        let Ok(found) = udp(captured) else {
+    fn take_all(&mut self, bytes: &[u8], bar: &ProgressBar) -> Result<(), CaptureError> {
+        for frame in Frames::new(bytes)? {
+            let frame = frame?;
+            bar.set_position(frame.offset as u64);
+            self.take(&frame);
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, frame: &Captured<'_>) {
+        let packet = match udp::packet(frame) {
+            Ok(Some(packet)) => packet,
+            Ok(None) => return,
+            Err(udp::CutFrame) => {
+                self.cut += 1;
+                return;
+            }
+        };
+        let bytes = packet.payload;
+        let is_position = bytes.len() == position::PACKET_LEN;
+        // Position packets of early firmware have headers that say that they are longer.
+        if packet.is_cut && !is_position {
             self.cut += 1;
-            return;
-        };
-        let Some((source, bytes)) = found else {
-            return;
-        };
-        if bytes.len() == data::PACKET_LEN || bytes.len() == position::PACKET_LEN {
-            self.data_packets += u64::from(bytes.len() == data::PACKET_LEN);
+        } else if is_position || bytes.len() == data::PACKET_LEN {
+            self.data_packets += u64::from(!is_position);
             self.packets.push(&Packet {
-                source,
-                arrival: captured.time,
+                source: packet.source,
+                arrival: frame.time,
                 bytes,
             });
         }
@@ -243,157 +229,5 @@ impl Clouds {
                 tell!("kreisel: {path}: {count} {what}");
             }
         }
-    }
-}
-
-/// Walks over the packets of a capture. Gives what ended it early, if anything did.
-fn walk(bytes: &[u8], mut visit: impl FnMut(usize, Captured<'_>)) -> Option<String> {
-    let mut reader = match create_reader(LARGEST_RECORD, bytes) {
-        Ok(reader) => reader,
-        Err(_) => return Some("byte 0: neither pcap nor pcapng".into()),
-    };
-    let (mut offset, mut links, mut nanoseconds) = (0, vec![], false);
-    let mut refilled_at = None;
-    loop {
-        match reader.next() {
-            Ok((length, block)) => {
-                match &block {
-                    PcapBlockOwned::LegacyHeader(header) => {
-                        nanoseconds = header.is_nanosecond_precision();
-                        links = vec![(header.network, 0, 0)];
-                    }
-                    PcapBlockOwned::NG(Block::SectionHeader(_)) => links.clear(),
-                    PcapBlockOwned::NG(Block::InterfaceDescription(interface)) => {
-                        links.push((
-                            interface.linktype,
-                            interface.if_tsoffset,
-                            interface.if_tsresol,
-                        ));
-                    }
-                    _ => {}
-                }
-                if let Some(captured) = captured(&block, &links, nanoseconds) {
-                    visit(offset, captured);
-                }
-                offset += length;
-                reader.consume(length);
-            }
-            Err(PcapError::Eof) => return None,
-            Err(PcapError::Incomplete(_)) if refilled_at != Some(offset) => {
-                refilled_at = Some(offset);
-                if reader.refill().is_err() {
-                    return Some(format!("byte {offset}: cannot be read"));
-                }
-            }
-            Err(PcapError::Incomplete(_) | PcapError::UnexpectedEof) => {
-                return Some(format!("byte {offset}: the last record is cut off"));
-            }
-            Err(_) => return Some(format!("byte {offset}: no record begins here")),
-        }
-    }
-}
-
-/// The packet in a record, if it holds one.
-fn captured<'a>(
-    block: &'a PcapBlockOwned<'_>,
-    links: &[(Linktype, i64, u8)],
-    nanoseconds: bool,
-) -> Option<Captured<'a>> {
-    match block {
-        PcapBlockOwned::Legacy(record) => {
-            let fraction = i64::from(record.ts_usec);
-            let micros = if nanoseconds {
-                fraction / 1000
-            } else {
-                fraction
-            };
-            Some(Captured {
-                time: Time::from_micros(i64::from(record.ts_sec) * 1_000_000 + micros),
-                link: links.first()?.0,
-                bytes: record.data,
-            })
-        }
-        PcapBlockOwned::NG(Block::EnhancedPacket(packet)) => {
-            let (link, offset_s, resolution) = *links.get(packet.if_id as usize)?;
-            let ticks = u64::from(packet.ts_high) << 32 | u64::from(packet.ts_low);
-            let micros =
-                micros(ticks, resolution)?.checked_add(offset_s.checked_mul(1_000_000)?)?;
-            Some(Captured {
-                time: Time::from_micros(micros),
-                link,
-                bytes: packet.packet_data(),
-            })
-        }
-        _ => None,
-    }
-}
-
-/// Time stamp ticks to microseconds (pcapng, option if_tsresol): a power of ten, or of two if
-/// the highest bit is set.
-fn micros(ticks: u64, resolution: u8) -> Option<i64> {
-    const DEFAULT_RESOLUTION: u8 = 6;
-    let resolution = if resolution == 0 {
-        DEFAULT_RESOLUTION
-    } else {
-        resolution
-    };
-    let exponent = u32::from(resolution & 0x7f);
-    let base: u128 = if resolution & 0x80 == 0 { 10 } else { 2 };
-    let per_second = base.checked_pow(exponent)?;
-    i64::try_from(u128::from(ticks) * 1_000_000 / per_second).ok()
-}
-
-/// Source and payload, if it is a UDP packet over IPv4, which sensors send; an error if it is cut or damaged.
-fn udp<'a>(captured: &Captured<'a>) -> Result<Option<([u8; 4], &'a [u8])>> {
-    let packet = match captured.link {
-        Linktype::ETHERNET => SlicedPacket::from_ethernet(captured.bytes),
-        Linktype::LINUX_SLL => SlicedPacket::from_linux_sll(captured.bytes),
-        Linktype::RAW | Linktype::IPV4 => SlicedPacket::from_ip(captured.bytes),
-        _ => return Ok(None),
-    };
-    let packet = match packet {
-        Ok(packet) => packet,
-        Err(error) => return position(captured).map(Some).ok_or(error.into()),
-    };
-    let (Some(NetSlice::Ipv4(ip)), Some(TransportSlice::Udp(udp))) =
-        (&packet.net, &packet.transport)
-    else {
-        return Ok(None);
-    };
-    Ok(Some((ip.header().source(), udp.payload())))
-}
-
-/// A position packet of early firmware, whose IP header says that it is longer than it is.
-fn position<'a>(captured: &Captured<'a>) -> Option<([u8; 4], &'a [u8])> {
-    let packet = LaxSlicedPacket::from_ethernet(captured.bytes).ok()?;
-    match (&packet.net, &packet.transport) {
-        (Some(LaxNetSlice::Ipv4(ip)), Some(TransportSlice::Udp(udp)))
-            if udp.payload().len() == position::PACKET_LEN =>
-        {
-            Some((ip.header().source(), udp.payload()))
-        }
-        _ => None,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ticks_of_every_resolution_become_microseconds() {
-        assert_eq!(micros(5_000_000, 0), Some(5_000_000));
-        assert_eq!(micros(5_000_000_000, 9), Some(5_000_000));
-        assert_eq!(micros(5 << 10, 0x8a), Some(5_000_000));
-        assert_eq!(micros(1, 0xff), Some(0));
-    }
-
-    #[test]
-    fn what_is_no_capture_says_so() {
-        let visit = |_, _: Captured<'_>| ();
-        assert_eq!(
-            walk(b"no capture at all, is it", visit).unwrap(),
-            "byte 0: neither pcap nor pcapng"
-        );
     }
 }

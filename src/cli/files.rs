@@ -9,8 +9,9 @@ use anyhow::{Context as _, Result, anyhow, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Completion;
-use super::capture::{self, Capture};
+use super::capture::Capture;
 use crate::config::{Configuration, text};
+use crate::wire::capture::is_capture;
 use crate::wire::recording::Damage;
 
 /// A whole file.
@@ -30,7 +31,7 @@ impl Recorded {
     /// Reads a file. What of a capture could not be read is said.
     pub(super) fn read(path: &Path) -> Result<Self> {
         let bytes = read(path)?;
-        if !capture::is_capture(&bytes) {
+        if !is_capture(&bytes) {
             return Ok(Self::Recording(bytes));
         }
         let capture = Capture::read(path, &bytes)?;

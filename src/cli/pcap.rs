@@ -3,19 +3,13 @@
 use std::path::Path;
 
 use anyhow::Result;
-use etherparse::PacketBuilder;
 
 use super::files::Output;
+use crate::wire::capture::{pcap, udp};
 use crate::wire::velodyne::Packet;
 
-/// A pcap file with time stamps in microseconds, little-endian, of Ethernet frames (libpcap's file format, version 2.4).
-const HEADER: [u8; 24] = [
-    0xd4, 0xc3, 0xb2, 0xa1, 2, 0, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 0, 0, 1, 0, 0, 0,
-];
 /// Velodyne's part of the address space, and a sensor of it.
 const SENSOR_ADDRESS: [u8; 6] = [0x60, 0x76, 0x88, 0, 0, 1];
-const BROADCAST: [u8; 4] = [255; 4];
-const TIME_TO_LIVE: u8 = 255;
 
 /// A capture that is written.
 #[derive(Debug)]
@@ -27,7 +21,7 @@ pub(super) struct PcapWriter {
 impl PcapWriter {
     pub(super) fn create(path: &Path) -> Result<Self> {
         let mut output = Output::create(path)?;
-        output.put(&HEADER)?;
+        output.put(&pcap::ETHERNET_HEADER)?;
         Ok(Self {
             output,
             frame: vec![],
@@ -35,22 +29,12 @@ impl PcapWriter {
     }
 
     pub(super) fn put(&mut self, packet: &Packet<'_>) -> Result<()> {
-        let port = packet.port();
         self.frame.clear();
-        PacketBuilder::ethernet2(SENSOR_ADDRESS, [0xff; 6])
-            .ipv4(packet.source, BROADCAST, TIME_TO_LIVE)
-            .udp(port, port)
-            .write(&mut self.frame, packet.bytes)?;
-        let micros = packet.arrival.micros();
+        let (source, port) = (packet.source, packet.port());
+        udp::put_broadcast(&mut self.frame, SENSOR_ADDRESS, source, port, packet.bytes)?;
         let length = self.frame.len() as u32;
-        for number in [
-            micros.div_euclid(1_000_000) as u32,
-            micros.rem_euclid(1_000_000) as u32,
-            length,
-            length,
-        ] {
-            self.output.put(&number.to_le_bytes())?;
-        }
+        self.output
+            .put(&pcap::record_header(packet.arrival, length))?;
         self.output.put(&self.frame)
     }
 

@@ -18,6 +18,8 @@ pub mod point_cloud;
 
 pub mod velodyne;
 
+pub mod capture;
+
 pub mod pose;
 
 pub mod object_list;
