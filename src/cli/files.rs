@@ -198,6 +198,13 @@ impl Write for Output {
     }
 }
 
+#[cfg(feature = "foxglove")]
+impl std::io::Seek for Output {
+    fn seek(&mut self, to: std::io::SeekFrom) -> std::io::Result<u64> {
+        self.writer.seek(to)
+    }
+}
+
 /// A progress bar on a terminal, nothing in a pipe.
 pub(super) fn progress(length: usize, unit: &str) -> ProgressBar {
     let bar = ProgressBar::new(length as u64);
