@@ -3,7 +3,7 @@
 mod rectangle;
 mod rigid;
 
-pub(crate) use rectangle::{Extent, turned};
+pub(crate) use rectangle::{DIRECTIONS, Extent, closest_rad, mean_closeness, turned};
 pub use rectangle::{Outline, Rectangle};
 pub use rigid::Rigid;
 pub(crate) use rigid::{angular, linear, turn};

@@ -22,7 +22,7 @@ pub struct Rectangle {
 }
 
 /// Directions that are tried within a quarter turn.
-const DIRECTIONS: usize = 2 * TOGETHER;
+pub(crate) const DIRECTIONS: usize = 2 * TOGETHER;
 /// Those that are tried together.
 const TOGETHER: usize = 16;
 /// Points that are looked at for the direction: more do not change it.
@@ -174,17 +174,33 @@ impl Sample {
 
     /// The direction in which the points lie closest to the edges of their rectangle.
     fn closest_rad(&self) -> f64 {
-        let mut best = (f32::MIN, 0);
-        for (number, tried) in TRIED.iter().enumerate() {
-            let closeness = closeness(&self.points_m[..self.count], tried);
-            for (lane, closeness) in closeness.into_iter().enumerate() {
-                if closeness > best.0 {
-                    best = (closeness, number * TOGETHER + lane);
-                }
-            }
-        }
-        tried_rad(best.1)
+        closest_rad(self.closeness().as_flattened())
     }
+
+    fn closeness(&self) -> [[f32; TOGETHER]; DIRECTIONS / TOGETHER] {
+        let points_m = &self.points_m[..self.count];
+        TRIED.each_ref().map(|tried| closeness(points_m, tried))
+    }
+}
+
+/// How close points lie on average to the edges of the rectangle around them, in each direction that
+/// is tried: the mean of 1/distance.
+pub(crate) fn mean_closeness(points_m: &[[f64; 2]]) -> [f32; DIRECTIONS] {
+    let sample = Sample::of(points_m);
+    let sums = sample.closeness();
+    let mut sums = sums.as_flattened().iter();
+    std::array::from_fn(|_| sums.next().map_or(0.0, |sum| sum / sample.count as f32))
+}
+
+/// The direction of the greatest closeness of all that are tried, the first of equal ones.
+pub(crate) fn closest_rad(closeness: &[f32]) -> f64 {
+    let mut best = (f32::MIN, 0);
+    for (number, closeness) in closeness.iter().enumerate() {
+        if *closeness > best.0 {
+            best = (*closeness, number);
+        }
+    }
+    tried_rad(best.1)
 }
 
 /// Sines and cosines of some directions.

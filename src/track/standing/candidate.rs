@@ -2,13 +2,14 @@
 
 use nalgebra::Vector2;
 
+use super::sides::Sides;
 use crate::geometry::Rectangle;
 use crate::time::Time;
 use crate::track::TrackParameters;
 use crate::track::look::Look;
 use crate::track::road_user::Track;
 use crate::track::sight::Sight;
-use crate::track::spots::Spot;
+use crate::track::spots::{Spot, places_m};
 
 /// A cluster of one revolution that may belong to a candidate.
 #[derive(Debug, Clone)]
@@ -24,6 +25,7 @@ pub(super) struct Sighting {
 #[derive(Debug, Clone)]
 pub(super) struct Candidate {
     pub(super) track: Track,
+    sides: Sides,
     /// Mean of what it looked like of late.
     log_odds: f64,
     looks: u32,
@@ -55,9 +57,18 @@ const FEWEST_LOOKS: u32 = 3;
 
 impl Candidate {
     /// What begins with a cluster.
-    pub(super) fn new(track: Track, sighting: &Sighting, end: Time) -> Self {
+    pub(super) fn new(
+        track: Track,
+        sighting: &Sighting,
+        spots: &[Spot],
+        end: Time,
+        outline: &mut Vec<[f64; 2]>,
+    ) -> Self {
+        outline.clear();
+        outline.extend(places_m(spots));
         let mut candidate = Self {
             track,
+            sides: Sides::new(outline, sighting.look.sensor_m.into()),
             log_odds: sighting.log_odds,
             looks: 1,
             is_empty: false,
@@ -86,6 +97,9 @@ impl Candidate {
         self.speed_mps = (sighting.look.middle_m - self.begun_m).norm() / seconds;
         self.track
             .measure(spots, &sighting.look, end, floor_z_m, outline);
+        outline.clear();
+        outline.extend(places_m(spots));
+        self.sides.see(outline, sighting.look.sensor_m.into());
         self.conclude();
     }
 
@@ -96,6 +110,7 @@ impl Candidate {
         rise_m: f64,
     ) {
         self.track.reframe(turn_rad, moved, rise_m);
+        self.sides.reframe(turn_rad, moved);
         self.begun_m = Vector2::from(moved(self.begun_m.into()));
     }
 
@@ -117,7 +132,7 @@ impl Candidate {
     }
 
     pub(super) fn place(&self) -> Rectangle {
-        self.track.rectangle()
+        self.sides.place()
     }
 
     /// Whether there is nothing left of it, or it is hardly a vehicle.

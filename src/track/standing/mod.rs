@@ -2,12 +2,15 @@
 //!
 //! What stands is told by its looks alone, and the place where it stands is all that must be known to
 //! recognise it. So a cluster is judged as DBSCAN gives it (`appearance`, by a small network whose
-//! `weights` are fitted), and belongs to the `candidate` in whose place it lies. What moves there takes
-//! the candidate's identity over, and a vehicle that came to rest gives it back.
+//! `weights` are fitted), and belongs to the `candidate` in whose place it lies, whose `sides` all looks
+//! together show. What moves there takes the candidate's identity over, and a vehicle that came to rest
+//! gives it back.
 
 mod appearance;
 
 mod candidate;
+
+mod sides;
 
 mod weights;
 
@@ -236,7 +239,8 @@ impl Standing {
             let floor_z_m = floor_z_m(spots, scene);
             let outline = &mut self.outline;
             let track = Track::new(0, false, spots, &sighting.look, end, floor_z_m, outline);
-            self.candidates.push(Candidate::new(track, sighting, end));
+            let candidate = Candidate::new(track, sighting, spots, end, outline);
+            self.candidates.push(candidate);
         }
     }
 
@@ -300,6 +304,9 @@ impl Standing {
             }
             let mut object = candidate.track.object(end);
             let place = candidate.place();
+            [object.centre_m[0], object.centre_m[1]] = place.centre_m;
+            object.yaw_rad = place.yaw_rad;
+            (object.length_m, object.width_m) = (place.length_m, place.width_m);
             let is_other = |other: &Object| is_one_place(&place, &other.rectangle());
             if object.existence < least_confidence || objects[..listed].iter().any(is_other) {
                 continue;

@@ -1,0 +1,241 @@
+//! The box of a vehicle that stands, by all that was seen of it of late.
+//!
+//! A single look may hold a piece of what stands beside, or miss an end. But what stands has the same
+//! sides in every look, so its direction is the one in which the returns of all looks lie close to
+//! edges, and it ends where most looks do, a look counting by its returns: a poor one takes nothing
+//! from what a good one told. What nobody saw is a car's, and lies behind.
+
+use std::f64::consts::FRAC_PI_2;
+
+use crate::ego::wrapped_rad;
+use crate::geometry::{DIRECTIONS, Extent, Rectangle, closest_rad, mean_closeness, turned};
+
+/// What was seen of the sides.
+#[derive(Debug, Clone)]
+pub(super) struct Sides {
+    /// Of each direction that is tried, how close all returns lie to edges.
+    closeness: [f32; DIRECTIONS],
+    looks: [Outermost; MOST_LOOKS],
+    place: Rectangle,
+}
+
+/// The outermost returns of one look.
+#[derive(Debug, Clone, Copy)]
+struct Outermost {
+    places_m: [[f64; 2]; WAYS],
+    /// How many returns it had, the less the longer ago; 0 for none.
+    worth: f64,
+}
+
+/// Looks that count: those of the greatest worth.
+const MOST_LOOKS: usize = 8;
+/// What is forgotten of a look with each later one.
+const FORGOTTEN: f64 = 0.01;
+/// Directions in which the outermost return is remembered, all around.
+const WAYS: usize = 16;
+/// Size of a car of which less is seen: a little less than that of new ones on average, for corners are
+/// round.
+const SIZE_M: [f64; 2] = [4.2, 1.75];
+/// What is longer or wider is rather no car, and what is shorter, seen side-on.
+const LONGEST_M: f64 = 5.0;
+const WIDEST_M: f64 = 2.0;
+const SHORTEST_M: f64 = 2.7;
+/// How much more a metre of width says against a way round than one of length.
+const WIDE_WEIGHT: f64 = 4.0;
+/// Cosine between the line of sight and an axis up to which all of it is seen.
+const SIDE_ON: f64 = 0.5;
+
+impl Sides {
+    /// What a first look shows: its returns relative to the sensor, and where that is.
+    pub(super) fn new(places_m: &[[f64; 2]], sensor_m: [f64; 2]) -> Self {
+        let nothing = Outermost {
+            places_m: [[0.0; 2]; WAYS],
+            worth: 0.0,
+        };
+        let mut sides = Self {
+            closeness: [0.0; DIRECTIONS],
+            looks: [nothing; MOST_LOOKS],
+            place: Rectangle::fit(places_m, None),
+        };
+        sides.see(places_m, sensor_m);
+        sides
+    }
+
+    /// Takes a further look in.
+    pub(super) fn see(&mut self, places_m: &[[f64; 2]], sensor_m: [f64; 2]) {
+        let (fresh, returns) = (mean_closeness(places_m), places_m.len() as f32);
+        for (known, fresh) in self.closeness.iter_mut().zip(fresh) {
+            *known += returns * fresh - FORGOTTEN as f32 * *known;
+        }
+        for known in &mut self.looks {
+            known.worth *= 1.0 - FORGOTTEN;
+        }
+        let fresh = Outermost::of(places_m, sensor_m);
+        let least = self
+            .looks
+            .iter_mut()
+            .min_by(|a, b| a.worth.total_cmp(&b.worth));
+        if let Some(least) = least.filter(|least| least.worth < fresh.worth) {
+            *least = fresh;
+        }
+        self.place = self.fit(sensor_m);
+    }
+
+    pub(super) fn reframe(&mut self, turn_rad: f64, moved: impl Fn([f64; 2]) -> [f64; 2]) {
+        let steps = libm::round(turn_rad / FRAC_PI_2 * DIRECTIONS as f64) as isize;
+        self.closeness
+            .rotate_right(steps.rem_euclid(DIRECTIONS as isize) as usize);
+        for look in &mut self.looks {
+            look.places_m = look.places_m.map(&moved);
+        }
+        self.place.centre_m = moved(self.place.centre_m);
+        self.place.yaw_rad = wrapped_rad(self.place.yaw_rad + turn_rad);
+    }
+
+    /// The box.
+    pub(super) fn place(&self) -> Rectangle {
+        self.place
+    }
+
+    /// Which way round the seen box is a car's, and where what was not seen lies.
+    fn fit(&self, sensor_m: [f64; 2]) -> Rectangle {
+        let yaw_rad = closest_rad(&self.closeness);
+        let (sine, cosine) = libm::sincos(yaw_rad);
+        let end_m = |end: fn(&Extent) -> [f64; 2]| {
+            let of =
+                |look: &Outermost| end(&Extent::of(look.places_m.iter().copied(), sine, cosine));
+            [0, 1].map(|axis| usual_m(&self.looks, |look| of(look)[axis]))
+        };
+        let (low_m, high_m) = (end_m(|extent| extent.low), end_m(|extent| extent.high));
+        let seen_m = [0, 1].map(|axis| high_m[axis] - low_m[axis]);
+        let middle_m = [0, 1].map(|axis| 0.5 * (low_m[axis] + high_m[axis]));
+        let sensor = turned(&sensor_m, sine, cosine);
+        let away_m = [0, 1].map(|axis| middle_m[axis] - sensor[axis]);
+        let range_m = libm::hypot(away_m[0], away_m[1]).max(1e-3);
+        let sight = away_m.map(|away_m| away_m / range_m);
+        let misfit_m = |length: usize| {
+            let short_m = if sight[length].abs() < SIDE_ON {
+                SHORTEST_M - seen_m[length]
+            } else {
+                0.0
+            };
+            let wide_m = (seen_m[1 - length] - WIDEST_M).max(0.0);
+            short_m.max(seen_m[length] - LONGEST_M).max(0.0) + WIDE_WEIGHT * wide_m
+        };
+        let misfits_m = [0, 1].map(misfit_m);
+        let length = usize::from((misfits_m[1], seen_m[0]) < (misfits_m[0], seen_m[1]));
+        let (mut size_m, mut centre) = (seen_m, middle_m);
+        for (axis, least_m) in [(length, SIZE_M[0]), (1 - length, SIZE_M[1])] {
+            size_m[axis] = seen_m[axis].max(least_m);
+            let behind = (3.0 * sight[axis]).clamp(-1.0, 1.0);
+            centre[axis] += 0.5 * behind * (size_m[axis] - seen_m[axis]);
+        }
+        Rectangle {
+            centre_m: turned(&centre, -sine, cosine),
+            yaw_rad: yaw_rad + FRAC_PI_2 * length as f64,
+            length_m: size_m[length],
+            width_m: size_m[1 - length],
+        }
+    }
+}
+
+impl Outermost {
+    fn of(places_m: &[[f64; 2]], [x_m, y_m]: [f64; 2]) -> Self {
+        let outermost_m = |way: usize| {
+            let (sine, cosine) = libm::sincos(4.0 * FRAC_PI_2 * way as f64 / WAYS as f64);
+            let ahead_m = |place_m: &[f64; 2]| turned(place_m, sine, cosine)[0];
+            let farthest = places_m
+                .iter()
+                .max_by(|a, b| ahead_m(a).total_cmp(&ahead_m(b)));
+            farthest.map_or([x_m, y_m], |[x, y]| [x_m + x, y_m + y])
+        };
+        Self {
+            places_m: std::array::from_fn(outermost_m),
+            worth: places_m.len() as f64,
+        }
+    }
+}
+
+/// The median of what looks show, each counted by its worth.
+fn usual_m(looks: &[Outermost; MOST_LOOKS], shown_m: impl Fn(&Outermost) -> f64) -> f64 {
+    let mut shown = looks.each_ref().map(|look| (shown_m(look), look.worth));
+    shown.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * shown.iter().map(|(_, worth)| worth).sum::<f64>();
+    let mut worth = 0.0;
+    let middle = shown.iter().find(|(_, own)| {
+        worth += own;
+        worth >= half
+    });
+    middle.map_or(0.0, |(metres, _)| *metres)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns on the side and on the rear of a car, each this long, of which the corner is at a place.
+    fn corner(at_m: [f64; 2], yaw_rad: f64, side_m: f64, rear_m: f64) -> Vec<[f64; 2]> {
+        let (sine, cosine) = libm::sincos(yaw_rad);
+        let steps = |length_m: f64| (0..=20).map(move |step| length_m * f64::from(step) / 20.0);
+        let side = steps(side_m).map(|along_m| [along_m, 0.0]);
+        let rear = steps(rear_m).map(|across_m| [0.0, across_m]);
+        side.chain(rear)
+            .map(|place_m| turned(&place_m, -sine, cosine))
+            .map(|[x, y]| [at_m[0] + x, at_m[1] + y])
+            .collect()
+    }
+
+    fn is_near(place: Rectangle, centre_m: [f64; 2], yaw_rad: f64) -> bool {
+        let off = [0, 1].map(|axis| place.centre_m[axis] - centre_m[axis]);
+        let turn = libm::sin(place.yaw_rad - yaw_rad);
+        libm::hypot(off[0], off[1]) < 0.15 && turn.abs() < 0.06
+    }
+
+    #[test]
+    fn a_look_with_a_piece_of_something_else_changes_nothing() {
+        let car = corner([8.0, 5.0], 0.2, 4.2, 1.7);
+        let mut with_a_hedge = car.clone();
+        with_a_hedge.extend((0..10).map(|step| [7.0, 7.0 + 0.2 * f64::from(step)]));
+        let mut sides = Sides::new(&car, [100.0, 0.0]);
+        for look in [&with_a_hedge, &car, &car] {
+            sides.see(look, [100.0, 0.0]);
+        }
+        let (sine, cosine) = libm::sincos(0.2);
+        let [x, y] = turned(&[2.1, 0.875], -sine, cosine);
+        let place = sides.place();
+        assert!(is_near(place, [108.0 + x, 5.0 + y], 0.2), "{place:?}");
+        assert!((place.length_m - 4.2).abs() < 0.15 && (place.width_m - 1.75).abs() < 0.15);
+    }
+
+    #[test]
+    fn of_a_car_from_behind_the_rest_lies_before_it() {
+        let rear = corner([10.0, -0.9], 0.0, 0.2, 1.7);
+        let place = Sides::new(&rear, [0.0; 2]).place();
+        assert!(is_near(place, [12.1, -0.05], 0.0), "{place:?}");
+        assert_eq!(place.length_m, SIZE_M[0]);
+    }
+
+    #[test]
+    fn another_frame_moves_all_of_it() {
+        let car = corner([8.0, 5.0], 0.2, 4.2, 1.7);
+        let turn_rad = 10.0 * FRAC_PI_2 / DIRECTIONS as f64;
+        let (sine, cosine) = libm::sincos(turn_rad);
+        let moved = |[x, y]: [f64; 2]| turned(&[x - 3.0, y + 1.0], -sine, cosine);
+        let mut sides = Sides::new(&car, [0.0; 2]);
+        let before = sides.place();
+        sides.reframe(turn_rad, moved);
+        let expected_m = moved(before.centre_m);
+        assert!(is_near(
+            sides.place(),
+            expected_m,
+            before.yaw_rad + turn_rad
+        ));
+        let seen: Vec<[f64; 2]> = car.into_iter().map(moved).collect();
+        sides.see(&seen, [0.0; 2]);
+        assert!(is_near(
+            sides.place(),
+            expected_m,
+            before.yaw_rad + turn_rad
+        ));
+    }
+}
