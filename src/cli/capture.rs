@@ -4,10 +4,9 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use indicatif::ProgressBar;
 
 use super::Completion;
-use super::files::progress;
+use super::progress::Progress;
 use crate::wire::capture::{CaptureError, Captured, Frames, udp};
 use crate::wire::envelope::Postmark;
 use crate::wire::point_cloud::POINT_CLOUD_ID;
@@ -34,9 +33,8 @@ impl Capture {
     /// # Errors
     /// When there is no data packet of a VLP-16 in it.
     pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Self> {
-        let (mut capture, bar) = (Self::default(), progress(bytes.len(), "bytes"));
-        capture.damage = capture.take_all(bytes, &bar).err();
-        bar.finish_and_clear();
+        let mut capture = Self::default();
+        capture.damage = capture.take_all(bytes).err();
         if capture.data_packets == 0 {
             let problem = capture.damage.map(|problem| problem.to_string());
             let problem = problem.unwrap_or_else(|| "byte 0: no VLP-16 data packets".into());
@@ -45,10 +43,11 @@ impl Capture {
         Ok(capture)
     }
 
-    fn take_all(&mut self, bytes: &[u8], bar: &ProgressBar) -> Result<(), CaptureError> {
+    fn take_all(&mut self, bytes: &[u8]) -> Result<(), CaptureError> {
+        let mut progress = Progress::of(bytes.len(), "bytes");
         for frame in Frames::new(bytes)? {
             let frame = frame?;
-            bar.set_position(frame.offset as u64);
+            progress.set(frame.offset);
             self.take(&frame);
         }
         Ok(())

@@ -6,7 +6,6 @@ use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow, bail};
-use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Completion;
 use super::capture::Capture;
@@ -203,20 +202,6 @@ impl std::io::Seek for Output {
     fn seek(&mut self, to: std::io::SeekFrom) -> std::io::Result<u64> {
         self.writer.seek(to)
     }
-}
-
-/// A progress bar on a terminal, nothing in a pipe.
-pub(super) fn progress(length: usize, unit: &str) -> ProgressBar {
-    let bar = ProgressBar::new(length as u64);
-    let template = if unit == "bytes" {
-        "{bar:40} {bytes}/{total_bytes} {eta}".into()
-    } else {
-        format!("{{bar:40}} {{pos}}/{{len}} {unit} {{eta}}")
-    };
-    if let Ok(style) = ProgressStyle::with_template(&template) {
-        bar.set_style(style);
-    }
-    bar
 }
 
 /// Says what is damaged in a file, in one line.

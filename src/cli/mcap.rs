@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::{Context as _, Result};
 
 use super::files::{self, Output};
+use super::progress::Progress;
 use super::{Completion, convert};
 use crate::foxglove::Stage;
 use crate::pipeline::{Outcome, Pipeline};
@@ -26,7 +27,7 @@ pub(super) fn write(arguments: &convert::Arguments) -> Result<Completion> {
     let writer = writer.create(output).with_context(named)?;
     let mut pipeline = Pipeline::new(&configuration, 0);
     let (mut faults, mut told): (_, Option<Time>) = (Tally::default(), None);
-    let bar = files::progress(bytes.len(), "bytes");
+    let mut progress = Progress::of(bytes.len(), "bytes");
     for item in Recording::new(&bytes) {
         let entry = match item {
             Ok(entry) => entry,
@@ -36,7 +37,7 @@ pub(super) fn write(arguments: &convert::Arguments) -> Result<Completion> {
                 continue;
             }
         };
-        bar.set_position(entry.offset as u64);
+        progress.set(entry.offset);
         match pipeline.handle(&entry.envelope) {
             Ok(Outcome::Revolution(report)) => {
                 pipeline.update_map();
@@ -56,7 +57,7 @@ pub(super) fn write(arguments: &convert::Arguments) -> Result<Completion> {
             }
         }
     }
-    bar.finish_and_clear();
+    drop(progress);
     writer.close().with_context(named)?.finish()?;
     report(&pipeline, &faults, &arguments.output)?;
     Ok(completion)

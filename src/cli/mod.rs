@@ -57,6 +57,8 @@ mod playback;
 
 mod process;
 
+mod progress;
+
 mod record;
 
 mod replay;

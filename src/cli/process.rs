@@ -8,6 +8,7 @@ use clap::Args;
 use super::files::Output;
 use super::labels::LabelWriter;
 use super::npz::Archive;
+use super::progress::Progress;
 use super::score::Score;
 use super::summary::Summary;
 use super::{Completion, files, map, objects, roads};
@@ -128,12 +129,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
             score.watch_gaps(&configuration.roundabout, roads);
         }
     }
-    let bar = files::progress(bytes.len(), "bytes");
+    let mut progress = Progress::of(bytes.len(), "bytes");
     let mut damages = usize::from(completion == Completion::Damaged);
     for item in Recording::new(&bytes) {
         match item {
             Ok(entry) => {
-                bar.set_position(entry.offset as u64);
+                progress.set(entry.offset);
                 process.take(&entry)?;
             }
             Err(damage) => {
@@ -142,7 +143,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
             }
         }
     }
-    bar.finish_and_clear();
+    drop(progress);
     process.finish(damages)
 }
 

@@ -10,6 +10,7 @@ use tokio::time::{Instant, sleep_until};
 
 use super::capture::Capture;
 use super::packets::PacketSender;
+use super::progress::Progress;
 use super::{Completion, block_on, files, simulate, stop_signal};
 use crate::config::Configuration;
 use crate::daemon::session::{Sender, Session};
@@ -190,7 +191,7 @@ async fn play_once(
     sender: &Sender,
     mut due: Instant,
 ) -> Result<Instant> {
-    let bar = files::progress(entries.len(), "envelopes");
+    let mut progress = Progress::of(entries.len(), "envelopes");
     let mut last = None;
     for entry in entries {
         let time = entry.envelope.time();
@@ -200,9 +201,8 @@ async fn play_once(
         sleep_until(due).await;
         let sent = sender.send(entry.frame);
         sent.with_context(|| format!("cannot send to {}", session.group()))?;
-        bar.inc(1);
+        progress.step();
     }
-    bar.finish_and_clear();
     // A loop of one envelope must not become a flood.
     Ok(due.max(Instant::now()) + Duration::from_millis(100).div_f64(arguments.speed))
 }

@@ -7,10 +7,11 @@ use anyhow::{Result, bail};
 use clap::Args;
 use tokio::time::{Instant, sleep_until};
 
-use super::files::{Output, check_distinct, progress};
+use super::files::{Output, check_distinct};
 use super::labels::LabelWriter;
 use super::npz::Archive;
 use super::pcap::PcapWriter;
+use super::progress::Progress;
 use super::{Completion, map, objects};
 use crate::daemon::session::Sender;
 use crate::roadmap::scn;
@@ -140,7 +141,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let grid = arguments.grid.as_deref();
     let grid = grid.map(Archive::create).transpose()?;
     let revolutions = (arguments.duration * ROTATION_HZ).round().max(1.0) as usize;
-    let bar = progress(revolutions, "revolutions");
+    let mut progress = Progress::of(revolutions, "revolutions");
     let mut simulation = match in_packets {
         true => Simulation::in_packets(*scenario, arguments.seed),
         false => Simulation::new(*scenario, arguments.seed),
@@ -156,9 +157,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
         if let Some(labels) = &mut labels {
             labels.put(simulation.labels().iter().copied(), revolution as u32)?;
         }
-        bar.inc(1);
+        progress.step();
     }
-    bar.finish_and_clear();
+    drop(progress);
     sink.finish(&mut simulation)?;
     truth.map_or(Ok(()), Output::finish)?;
     labels.map_or(Ok(()), LabelWriter::finish)?;
