@@ -1,4 +1,4 @@
-//! Files in and out, with errors that name them, and progress.
+//! Files in and out, with errors that name them.
 
 use std::fs::{File, Metadata};
 use std::io::{BufWriter, Write};
@@ -197,6 +197,7 @@ impl Write for Output {
     }
 }
 
+// What writes MCAP files goes back to say how long a chunk became.
 #[cfg(feature = "foxglove")]
 impl std::io::Seek for Output {
     fn seek(&mut self, to: std::io::SeekFrom) -> std::io::Result<u64> {

@@ -188,8 +188,7 @@ impl Sample {
 pub(crate) fn mean_closeness(points_m: &[[f64; 2]]) -> [f32; DIRECTIONS] {
     let sample = Sample::of(points_m);
     let sums = sample.closeness();
-    let mut sums = sums.as_flattened().iter();
-    std::array::from_fn(|_| sums.next().map_or(0.0, |sum| sum / sample.count as f32))
+    std::array::from_fn(|number| sums.as_flattened()[number] / sample.count as f32)
 }
 
 /// The direction of the greatest closeness of all that are tried, the first of equal ones.

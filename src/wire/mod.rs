@@ -2,7 +2,8 @@
 //!
 //! A datagram holds one frame (`frame`), a frame one envelope (`envelope`), an envelope the
 //! bytes of one message (`message` and the modules after it). A recording (`recording`) is
-//! frames end to end. Degrees, centimetres, zigzag and big-endian end in this folder.
+//! frames end to end. What was captured of a sensor's network is read by `capture`. Degrees,
+//! centimetres, zigzag and big-endian end in this folder.
 
 pub mod protobuf;
 

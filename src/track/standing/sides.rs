@@ -55,7 +55,12 @@ impl Sides {
         let mut sides = Self {
             closeness: [0.0; DIRECTIONS],
             looks: [nothing; MOST_LOOKS],
-            place: Rectangle::fit(places_m, None),
+            place: Rectangle {
+                centre_m: sensor_m,
+                yaw_rad: 0.0,
+                length_m: 0.0,
+                width_m: 0.0,
+            },
         };
         sides.see(places_m, sensor_m);
         sides
