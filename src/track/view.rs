@@ -22,6 +22,8 @@ pub(super) struct View {
     is_whole: [bool; 2],
     /// Only a cabin or a rider is seen: what is below reaches farther to both ends.
     is_upper: bool,
+    /// All that is seen is higher than a bonnet.
+    is_cabin: bool,
     /// Nothing hides an end of it.
     is_free: bool,
     /// The sensor looks at a side, not at the front or the rear.
@@ -36,6 +38,9 @@ pub(super) struct View {
 const SIDE_ON: f64 = 0.7;
 /// Part of a length below which what is seen of a side may be any piece of it.
 const PIECE: f64 = 0.4;
+
+/// Height of the rear edge of a bonnet.
+const BONNET_M: f64 = 0.95;
 
 /// Standard deviation of an edge: noise of ranges and roundness of corners.
 const EDGE_M: f64 = 0.07;
@@ -60,6 +65,7 @@ impl View {
             high_is_edge: [false; 2],
             is_whole: [false; 2],
             is_upper: false,
+            is_cabin: look.floor_m > BONNET_M,
             is_free: look.is_cut == [false; 2],
             is_side_on: left[0].abs() > SIDE_ON,
             sine,
@@ -108,20 +114,25 @@ impl View {
     }
 
     /// Where the middle of a box of this size is, given where it is expected, how sure its direction
-    /// is and whether it is a vehicle that moves, and how sure that is, as a covariance in the
-    /// local frame.
+    /// is and how far it went if it is a vehicle that moves, and how sure that is, as a covariance in
+    /// the local frame.
     pub(super) fn centre(
         &self,
         size_m: [f64; 2],
         size_deviation_m: [f64; 2],
         expected_m: Vector2<f64>,
         yaw_variance: f64,
-        is_moving_vehicle: bool,
+        gone_m: Option<f64>,
     ) -> (Vector2<f64>, Matrix2<f64>) {
         /// Share of what is missing below a cabin by which its middle is off the vehicle's.
         const UPPER: f64 = 0.4;
-        /// Share of the length that reaches out below a cabin to either end.
+        /// Share of the length that reaches out below a cabin, where the front is known: behind it, and the
+        /// bonnet before it.
+        const INSETS: [f64; 2] = [0.08, 0.3];
+        /// To either end where it is not.
         const INSET: f64 = 0.1;
+        /// Way after which it is: a middle far from what is seen pulls a course that is not known well.
+        const KNOWN_M: f64 = 10.0;
         /// What is no longer is somebody, or has a rider, who is in the middle within this.
         const LONGEST_WITH_RIDER_M: f64 = 2.5;
         const RIDER_M: f64 = 0.15;
@@ -138,15 +149,20 @@ impl View {
             let half_m = 0.5 * size_m[axis].max(high - low);
             let unsure_m = 0.5 * size_deviation_m[axis];
             let is_inset = self.is_upper && axis == 0 && size_m[axis] < LONGEST_WITH_BONNET_M;
-            let inset_m = if is_inset {
-                (INSET * size_m[axis]).min((half_m - 0.5 * (high - low)).max(0.0))
-            } else {
-                0.0
+            let slack_m = (half_m - 0.5 * (high - low)).max(0.0);
+            let is_front_known = gone_m.is_some_and(|gone_m| gone_m > KNOWN_M);
+            let shares = match (is_inset, is_front_known && self.is_cabin) {
+                (false, _) => [0.0; 2],
+                (true, false) => [INSET; 2],
+                (true, true) => INSETS,
             };
-            let edge_m = self.edge_m + inset_m;
+            let reach_m = (shares[0] + shares[1]) * size_m[axis];
+            let part = (2.0 * slack_m).min(reach_m) / reach_m.max(1e-9);
+            let [rear_m, front_m] = shares.map(|share| part * share * size_m[axis]);
+            let edge_m = self.edge_m + rear_m;
             // What drives out of sight is not seen up to its ends, whatever hides it.
             let is_piece = axis == 0
-                && is_moving_vehicle
+                && gone_m.is_some()
                 && self.is_side_on
                 && high - low < PIECE * size_m[axis];
             let is_edge = [self.low_is_edge[axis], self.high_is_edge[axis]];
@@ -155,10 +171,10 @@ impl View {
             let is_edge = is_edge.map(|is_edge| (is_edge || is_rider) && !is_piece);
             (centre[axis], deviation[axis]) = match is_edge.into() {
                 (true, true) if is_rider && self.is_free => (0.5 * (low + high), edge_m + RIDER_M),
-                (true, true) if is_inset => {
-                    let slack_m = half_m - 0.5 * (high - low);
-                    (0.5 * (low + high), edge_m + UPPER * slack_m)
-                }
+                (true, true) if is_inset => (
+                    0.5 * (low - rear_m + high + front_m),
+                    edge_m + UPPER * slack_m,
+                ),
                 // Seen from end to end; if it is shorter than known, some of it was missed.
                 (true, true) => {
                     let missed_m = half_m - 0.5 * (high - low);
@@ -170,10 +186,9 @@ impl View {
                         edge_m + 0.5 * missed_m,
                     )
                 }
-                (true, false) => (low - inset_m + half_m, libm::hypot(edge_m, unsure_m)),
-                (false, true) => (high + inset_m - half_m, libm::hypot(edge_m, unsure_m)),
+                (true, false) => (low - rear_m + half_m, libm::hypot(edge_m, unsure_m)),
+                (false, true) => (high + front_m - half_m, libm::hypot(edge_m, unsure_m)),
                 (false, false) => {
-                    let slack_m = half_m - 0.5 * (high - low);
                     let middle = 0.5 * (low + high);
                     (
                         expected[axis].clamp(middle - slack_m, middle + slack_m),
@@ -224,18 +239,17 @@ mod tests {
         let spots = spots_of(&scan);
         let look = Look::at(&spots, &scan, Vector2::zeros());
         let view = View::of(&look, &spots, 0.0);
-        let centre_x_m = |expected_x_m: f64, is_moving_vehicle: bool| {
+        let centre_x_m = |expected_x_m: f64, gone_m: Option<f64>| {
             let expected_m = Vector2::new(expected_x_m, 33.8);
-            let (centre_m, noise) =
-                view.centre([4.3, 1.8], [0.1; 2], expected_m, 0.0, is_moving_vehicle);
+            let (centre_m, noise) = view.centre([4.3, 1.8], [0.1; 2], expected_m, 0.0, gone_m);
             (centre_m.x, libm::sqrt(noise[(0, 0)]))
         };
         for expected_x_m in [0.0, 2.0] {
-            let (x_m, deviation_m) = centre_x_m(expected_x_m, true);
+            let (x_m, deviation_m) = centre_x_m(expected_x_m, Some(0.0));
             assert!((x_m - expected_x_m).abs() < 1e-9 && deviation_m > 1.0);
         }
-        let (x_m, deviation_m) = centre_x_m(0.0, false);
-        assert_eq!(x_m, centre_x_m(2.0, false).0);
+        let (x_m, deviation_m) = centre_x_m(0.0, None);
+        assert_eq!(x_m, centre_x_m(2.0, None).0);
         assert!(deviation_m < 0.3);
     }
 
@@ -251,7 +265,7 @@ mod tests {
         let view = View::of(&look, &spots, 0.0);
         for off_m in [-0.6, 0.6] {
             let expected_m = look.middle_m + Vector2::new(off_m, 0.0);
-            let (centre_m, noise) = view.centre([1.7, 0.6], [0.1; 2], expected_m, 0.0, false);
+            let (centre_m, noise) = view.centre([1.7, 0.6], [0.1; 2], expected_m, 0.0, None);
             let deviation_m = libm::sqrt(noise[(0, 0)]);
             assert!((centre_m.x - look.middle_m.x).abs() < 0.01);
             assert!(deviation_m < 0.5, "{deviation_m}");
@@ -262,7 +276,7 @@ mod tests {
             ..look
         };
         let view = View::of(&look, &spots, 0.0);
-        let (_, noise) = view.centre([1.7, 0.6], [0.1; 2], look.middle_m, 0.0, false);
+        let (_, noise) = view.centre([1.7, 0.6], [0.1; 2], look.middle_m, 0.0, None);
         assert!(libm::sqrt(noise[(0, 0)]) > 0.55);
     }
 
@@ -278,7 +292,13 @@ mod tests {
         let view = View::of(&look, &spots, std::f64::consts::FRAC_PI_2);
         let across_m = |length_m: f64, yaw_variance: f64| {
             let expected_m = Vector2::new(0.9, 20.0 + 0.5 * length_m);
-            let (_, noise) = view.centre([length_m, 1.8], [0.0; 2], expected_m, yaw_variance, true);
+            let (_, noise) = view.centre(
+                [length_m, 1.8],
+                [0.0; 2],
+                expected_m,
+                yaw_variance,
+                Some(0.0),
+            );
             libm::sqrt(noise[(0, 0)])
         };
         let sure_m = across_m(4.3, 0.0);
@@ -304,10 +324,34 @@ mod tests {
         let view = View::of(&look, &spots, std::f64::consts::FRAC_PI_2);
         let rear_m = |length_m: f64| {
             let expected_m = Vector2::new(1.2, 25.0 + 0.5 * length_m);
-            let (centre_m, _) = view.centre([length_m, 2.5], [0.1; 2], expected_m, 0.0, true);
+            let (centre_m, _) = view.centre([length_m, 2.5], [0.1; 2], expected_m, 0.0, Some(0.0));
             centre_m.y - 0.5 * length_m
         };
         assert!((rear_m(12.0) - 25.0).abs() < 0.2, "{}", rear_m(12.0));
         assert!(rear_m(4.3) < 24.8, "{}", rear_m(4.3));
+    }
+
+    #[test]
+    fn a_cabin_lies_behind_the_middle_of_a_car_whose_front_is_known() {
+        // The side of a cabin, 2.6 m of it, 40 m away, higher than bonnets.
+        let scan = scan_of(1800, |column, layer| match column {
+            0..19 if layer == 7 => 4000,
+            _ => 0,
+        });
+        let spots = spots_of(&scan);
+        let look = Look {
+            floor_m: 1.2,
+            is_upper: true,
+            ..Look::at(&spots, &scan, Vector2::zeros())
+        };
+        let view = View::of(&look, &spots, 0.0);
+        let ahead_m = |gone_m: Option<f64>| {
+            let (centre_m, _) = view.centre([4.3, 1.8], [0.1; 2], look.middle_m, 0.0, gone_m);
+            centre_m.x - look.middle_m.x
+        };
+        for gone_m in [None, Some(1.0)] {
+            assert!(ahead_m(gone_m).abs() < 0.1, "{}", ahead_m(gone_m));
+        }
+        assert!((0.3..0.6).contains(&ahead_m(Some(20.0))));
     }
 }

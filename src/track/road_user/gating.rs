@@ -50,7 +50,7 @@ impl Track {
             self.shape.size_deviation_m(vehicle),
             expected_m,
             self.shape.yaw_variance.min(MOST_YAW_VARIANCE),
-            self.is_moving_vehicle(),
+            self.is_moving_vehicle().then_some(self.travelled_m),
         );
         (centre_m, noise + Matrix2::identity() * MIDDLE_M * MIDDLE_M)
     }
