@@ -11,6 +11,10 @@ use crate::track::{Class, Object};
 
 /// A gap that one should not miss.
 const LONG_GAP_S: f64 = 4.0;
+/// And that stays open so long: a shorter one is as long as it must be at one moment, and cannot be used.
+const OPEN_S: f64 = 0.5;
+/// Between its first and its last revolution a gap is open for one less than in all.
+const REVOLUTION_S: f64 = 0.1;
 /// Announcements that are wrong by more than this are no matter of rounding.
 const CLEARLY_S: f64 = 0.25;
 /// Times to the conflict point are compared from so early.
@@ -46,10 +50,16 @@ struct WayScore {
     announced: usize,
     unsafe_goes: usize,
     clearly_unsafe: usize,
-    /// The true gap that lasts: whether it was announced.
-    gap: Option<bool>,
-    gaps: usize,
-    missed: usize,
+    /// True gaps, the last of which may last still.
+    gaps: Vec<TrueGap>,
+    was_truly_open: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct TrueGap {
+    from_s: f64,
+    until_s: f64,
+    was_announced: bool,
 }
 
 impl GapScore {
@@ -84,8 +94,9 @@ impl GapScore {
         let scores = self.entries.iter_mut().zip(&mut self.exits);
         for ((said, known), (entry, exit)) in arms.zip(scores) {
             self.agreed += usize::from(said.entry.may_go == known.entry.may_go);
-            entry.take(&said.entry, &known.entry, self.margin_s);
-            exit.take(&said.exit, &known.exit, self.margin_s);
+            let now_s = truth.time.seconds();
+            entry.take(&said.entry, &known.entry, self.margin_s, now_s);
+            exit.take(&said.exit, &known.exit, self.margin_s, now_s);
         }
         let pairs = pairs(objects, truth.objects);
         compare_lanes(&mut self.lanes, advice, true_advice, truth.objects, &pairs);
@@ -129,18 +140,25 @@ impl GapScore {
 /// How gaps were announced on ways.
 fn gaps_of(ways: &[WayScore]) -> String {
     let sum = |count: fn(&WayScore) -> usize| ways.iter().map(count).sum::<usize>();
+    let missed_of = |least_s: f64| {
+        let gaps = ways.iter().flat_map(|way| &way.gaps);
+        let gaps = gaps.filter(|gap| gap.until_s - gap.from_s > least_s);
+        let missed = gaps.clone().filter(|gap| !gap.was_announced).count();
+        format!("{missed} of {}", gaps.count())
+    };
     format!(
-        "{} gaps announced, {} unsafe, {} by more than {CLEARLY_S} s; {} of {} true gaps of {LONG_GAP_S} s missed",
+        "{} gaps announced, {} unsafe, {} by more than {CLEARLY_S} s; {} true gaps of {LONG_GAP_S} s missed, and {} of \
+         those that stay open for {OPEN_S} s",
         sum(|way| way.announced),
         sum(|way| way.unsafe_goes),
         sum(|way| way.clearly_unsafe),
-        sum(|way| way.missed + usize::from(way.gap == Some(false))),
-        sum(|way| way.gaps),
+        missed_of(f64::NEG_INFINITY),
+        missed_of(OPEN_S - 1.5 * REVOLUTION_S),
     )
 }
 
 impl WayScore {
-    fn take(&mut self, said: &Crossing, known: &Crossing, margin_s: f64) {
+    fn take(&mut self, said: &Crossing, known: &Crossing, margin_s: f64, now_s: f64) {
         let short_s = margin_s - known.margin_s;
         let gap_s = known.gap_s;
         let (said, known) = (said.may_go, known.may_go);
@@ -150,17 +168,19 @@ impl WayScore {
             self.clearly_unsafe += usize::from(!known && short_s > CLEARLY_S);
         }
         self.was_open = said;
-        match (&mut self.gap, known) {
-            (Some(announced), true) => *announced |= said,
-            (Some(announced), false) => {
-                self.missed += usize::from(!*announced);
-                self.gap = None;
-            }
-            (None, true) if gap_s >= LONG_GAP_S => {
-                self.gaps += 1;
-                self.gap = Some(said);
-            }
-            (None, _) => {}
+        let begins = known && !self.was_truly_open && gap_s >= LONG_GAP_S;
+        if begins {
+            self.gaps.push(TrueGap {
+                from_s: now_s,
+                until_s: now_s,
+                was_announced: said,
+            });
+            self.was_truly_open = true;
+        } else if !known {
+            self.was_truly_open = false;
+        } else if let Some(gap) = self.gaps.last_mut().filter(|_| self.was_truly_open) {
+            gap.until_s = now_s;
+            gap.was_announced |= said;
         }
     }
 }
