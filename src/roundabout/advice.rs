@@ -179,7 +179,7 @@ impl Crossing {
                 advice.gap_s = advice.gap_s.min(window.begin_s);
                 if margin_s < advice.margin_s {
                     advice.margin_s = margin_s;
-                    if margin_s < parameters.margin_s {
+                    if margin_s < asked.margin_s {
                         advice.hindrance = Some(Hindrance::RoadUser(window.object_id));
                     }
                 }
@@ -188,7 +188,7 @@ impl Crossing {
                 let (comes_s, seen_share) =
                     unseen.before(asked.site, conflict, parameters.speed_mps);
                 advice.seen_share = advice.seen_share.min(seen_share);
-                if comes_s - end_s < parameters.margin_s && advice.hindrance.is_none() {
+                if comes_s - end_s < asked.margin_s && advice.hindrance.is_none() {
                     advice.hindrance = Some(Hindrance::Unseen);
                 }
             }

@@ -69,14 +69,16 @@ impl<'a> Users<'a> {
 
 /// Windows farther off than this are not told.
 pub(super) const HORIZON_S: f64 = 15.0;
-/// Who comes with less than this probability is not waited for.
+/// Who comes with less than this probability is not waited for: of those who are known, and of those who are seen, as
+/// what is seen of somebody who leaves is never quite right.
 const LEAST_PROBABILITY: f64 = 0.03;
+const LEAST_SEEN_PROBABILITY: f64 = 0.02;
 /// Slower road users do not come: they wait.
 const WAITS_MPS: f64 = 0.7;
 /// Who goes along a pavement with less than this share of his speed goes across it.
 const ALONG_SHARE: f64 = 0.7;
 /// Who was first seen so lately may be faster than he seems, and go another way.
-const NEW_S: f64 = 2.0;
+const NEW_S: f64 = 1.0;
 /// Time that a road user must have been gone before the vehicle comes.
 pub(super) const BEHIND_S: f64 = 0.3;
 /// Standard deviations that a window is widened by at either end.
@@ -138,6 +140,10 @@ pub(super) struct Asked<'a> {
     pub(super) now: Time,
     /// As fast as anybody comes on the road.
     pub(super) road_mps: f64,
+    /// Whether the road users are seen, and not known.
+    pub(super) is_seen: bool,
+    /// What the gap must leave.
+    pub(super) margin_s: f64,
 }
 
 /// The windows of a road user at the conflict points of a way.
@@ -160,8 +166,12 @@ pub(super) fn windows(asked: &Asked<'_>, user: &User<'_>, found: &mut Vec<Window
                 None => window,
             });
         }
-        let counts =
-            |window: &Window| window.probability >= LEAST_PROBABILITY && window.begin_s < HORIZON_S;
+        let least = if asked.is_seen {
+            LEAST_SEEN_PROBABILITY
+        } else {
+            LEAST_PROBABILITY
+        };
+        let counts = |window: &Window| window.probability >= least && window.begin_s < HORIZON_S;
         found.extend(best.filter(counts).map(|window| Window {
             arm: asked.arm,
             at_exit: asked.at_exit,

@@ -85,7 +85,7 @@ const FORGOTTEN: f64 = 0.2;
 /// Road users keep to the middle of a lane within this share of its width (standard deviation).
 const WIDTH_SHARE: f64 = 0.25;
 /// And to its direction.
-const HEADING_RAD: f64 = 0.2;
+const HEADING_RAD: f64 = 0.12;
 /// And to its curvature.
 const YAW_RATE_RADPS: f64 = 0.2;
 /// Slower ones have no heading that says anything.
@@ -334,12 +334,17 @@ fn on_way(
         before_per_m + turned * (curvature_per_m(way, station.along_m) - before_per_m);
     let (course_rad, speed_mps) = course(object);
     let fit = motion_fit(object, station.heading_rad, curvature_per_m);
+    // Nobody goes out on a way in, and of who has only just come into view the direction is not known well.
+    let leads = match place {
+        Place::Entry(..) => 1.0,
+        _ => libm::cos(course_rad - station.heading_rad),
+    };
     let on = OnLane {
         place,
         probability: 0.0,
         along_m: station.along_m,
         offset_m: station.offset_m,
-        speed_mps: speed_mps * libm::cos(course_rad - station.heading_rad),
+        speed_mps: speed_mps * leads,
         mean_speed_mps: 0.0,
     };
     let likelihood =

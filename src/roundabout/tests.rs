@@ -185,6 +185,35 @@ fn who_stands_at_another_arm_gives_way() {
     );
 }
 
+/// Of somebody far away the direction is not known well; on a way in there is one only.
+#[test]
+fn who_is_on_a_way_in_comes_whichever_way_he_seems_to_be_turned() {
+    let mut comes = round(Class::Car, ROAD_M, 180.0, 6.0);
+    comes.centre_m = [CENTRE_M[0] - 22.0, CENTRE_M[1] - 1.75, 0.7];
+    comes.yaw_rate_radps = 0.0;
+    for yaw_rad in [0.0, 1.0, -2.5] {
+        comes.yaw_rad = yaw_rad;
+        let mut watcher = watcher();
+        watcher.watch(&situation(std::slice::from_ref(&comes)));
+        let entry = &own_arm(&watcher).entry;
+        assert_eq!(entry.hindrance, Some(Hindrance::RoadUser(7)), "{yaw_rad}");
+        assert!(entry.gap_s < 6.5, "{yaw_rad} {entry:?}");
+    }
+}
+
+#[test]
+fn a_gap_opens_with_caution_where_road_users_are_seen_and_stays_down_to_the_margin() {
+    let mut watcher = watcher();
+    let margin_s = watcher.parameters.margin_s;
+    assert_eq!(watcher.margin_s(1, false, false), margin_s);
+    assert_eq!(watcher.margin_s(1, false, true), margin_s + CAUTION_S);
+    watcher.watch(&situation(&[]));
+    assert!(own_arm(&watcher).entry.may_go);
+    assert_eq!(watcher.margin_s(1, false, true), margin_s);
+    watcher.forget();
+    assert_eq!(watcher.margin_s(1, false, true), margin_s + CAUTION_S);
+}
+
 /// Who has only just been seen may be faster than he seems.
 #[test]
 fn nothing_is_taken_for_granted_of_newcomers() {
