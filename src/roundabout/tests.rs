@@ -3,6 +3,7 @@ mod found;
 
 use std::f64::consts::PI;
 
+use super::arms::CAUTION_S;
 use super::*;
 use crate::parameter::Profile;
 use crate::simulate::scenario;
