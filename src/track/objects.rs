@@ -8,7 +8,7 @@ use nalgebra::Vector2;
 use super::assignment::{Assigner, Candidate};
 use super::grouping::Grouping;
 use super::nearby::Places;
-use super::road_user::Track;
+use super::road_user::{GATE, Track};
 use super::sight::Sight;
 use super::spots::Spot;
 use super::standing::{FEATURES, Standing};
@@ -48,9 +48,6 @@ const BUMPER_RETURNS: usize = 15;
 /// Share of its columns in which a new object may go on above: more do so in walls, hedges and
 /// trunks, of which there are many tracks otherwise that nobody needs.
 const MOST_GOES_ON: f64 = 0.65;
-/// Cost beyond which a group is not a track: chi-squared of two degrees of freedom at 0.9997,
-/// and the prices for size and spread.
-const GATE: f64 = 16.0;
 /// What it speaks for a pairing that the group was found in the track's place.
 const CLAIM_BONUS: f64 = 4.0;
 /// Farthest leap from one revolution to the next.

@@ -114,15 +114,15 @@ impl View {
     }
 
     /// Where the middle of a box of this size is, given where it is expected, how sure its direction
-    /// is and how far it went if it is a vehicle that moves, and how sure that is, as a covariance in
-    /// the local frame.
+    /// is and whether it is a vehicle that moves, and how sure that is, as a covariance in the local
+    /// frame.
     pub(super) fn centre(
         &self,
         size_m: [f64; 2],
         size_deviation_m: [f64; 2],
         expected_m: Vector2<f64>,
         yaw_variance: f64,
-        gone_m: Option<f64>,
+        drives: bool,
     ) -> (Vector2<f64>, Matrix2<f64>) {
         /// Share of what is missing below a cabin by which its middle is off the vehicle's.
         const UPPER: f64 = 0.4;
@@ -131,8 +131,6 @@ impl View {
         const INSETS: [f64; 2] = [0.08, 0.3];
         /// To either end where it is not.
         const INSET: f64 = 0.1;
-        /// Way after which it is: a middle far from what is seen pulls a course that is not known well.
-        const KNOWN_M: f64 = 10.0;
         /// What is no longer is somebody, or has a rider, who is in the middle within this.
         const LONGEST_WITH_RIDER_M: f64 = 2.5;
         const RIDER_M: f64 = 0.15;
@@ -152,9 +150,7 @@ impl View {
             // Of a bicycle of which the rider is seen nobody knows which end is nearer.
             let is_rider = is_inset && size_m[axis] < LONGEST_WITH_RIDER_M;
             let slack_m = (half_m - 0.5 * (high - low)).max(0.0);
-            let is_front_known = gone_m.is_some_and(|gone_m| gone_m > KNOWN_M);
-            let has_bonnet = self.is_cabin && is_front_known && !is_rider;
-            let shares = match (is_inset, has_bonnet) {
+            let shares = match (is_inset, self.is_cabin && drives && !is_rider) {
                 (false, _) => [0.0; 2],
                 (true, false) => [INSET; 2],
                 (true, true) => INSETS,
@@ -164,10 +160,8 @@ impl View {
             let [rear_m, front_m] = shares.map(|share| part * share * size_m[axis]);
             let edge_m = self.edge_m + rear_m;
             // What drives out of sight is not seen up to its ends, whatever hides it.
-            let is_piece = axis == 0
-                && gone_m.is_some()
-                && self.is_side_on
-                && high - low < PIECE * size_m[axis];
+            let is_piece =
+                axis == 0 && drives && self.is_side_on && high - low < PIECE * size_m[axis];
             let is_edge = [self.low_is_edge[axis], self.high_is_edge[axis]];
             let is_edge = is_edge.map(|is_edge| (is_edge || is_rider) && !is_piece);
             (centre[axis], deviation[axis]) = match is_edge.into() {
@@ -240,17 +234,17 @@ mod tests {
         let spots = spots_of(&scan);
         let look = Look::at(&spots, &scan, Vector2::zeros());
         let view = View::of(&look, &spots, 0.0);
-        let centre_x_m = |expected_x_m: f64, gone_m: Option<f64>| {
+        let centre_x_m = |expected_x_m: f64, drives: bool| {
             let expected_m = Vector2::new(expected_x_m, 33.8);
-            let (centre_m, noise) = view.centre([4.3, 1.8], [0.1; 2], expected_m, 0.0, gone_m);
+            let (centre_m, noise) = view.centre([4.3, 1.8], [0.1; 2], expected_m, 0.0, drives);
             (centre_m.x, libm::sqrt(noise[(0, 0)]))
         };
         for expected_x_m in [0.0, 2.0] {
-            let (x_m, deviation_m) = centre_x_m(expected_x_m, Some(0.0));
+            let (x_m, deviation_m) = centre_x_m(expected_x_m, true);
             assert!((x_m - expected_x_m).abs() < 1e-9 && deviation_m > 1.0);
         }
-        let (x_m, deviation_m) = centre_x_m(0.0, None);
-        assert_eq!(x_m, centre_x_m(2.0, None).0);
+        let (x_m, deviation_m) = centre_x_m(0.0, false);
+        assert_eq!(x_m, centre_x_m(2.0, false).0);
         assert!(deviation_m < 0.3);
     }
 
@@ -266,7 +260,7 @@ mod tests {
         let view = View::of(&look, &spots, 0.0);
         for off_m in [-0.6, 0.6] {
             let expected_m = look.middle_m + Vector2::new(off_m, 0.0);
-            let (centre_m, noise) = view.centre([1.7, 0.6], [0.1; 2], expected_m, 0.0, None);
+            let (centre_m, noise) = view.centre([1.7, 0.6], [0.1; 2], expected_m, 0.0, false);
             let deviation_m = libm::sqrt(noise[(0, 0)]);
             assert!((centre_m.x - look.middle_m.x).abs() < 0.01);
             assert!(deviation_m < 0.5, "{deviation_m}");
@@ -277,7 +271,7 @@ mod tests {
             ..look
         };
         let view = View::of(&look, &spots, 0.0);
-        let (_, noise) = view.centre([1.7, 0.6], [0.1; 2], look.middle_m, 0.0, None);
+        let (_, noise) = view.centre([1.7, 0.6], [0.1; 2], look.middle_m, 0.0, false);
         assert!(libm::sqrt(noise[(0, 0)]) > 0.55);
     }
 
@@ -293,13 +287,7 @@ mod tests {
         let view = View::of(&look, &spots, std::f64::consts::FRAC_PI_2);
         let across_m = |length_m: f64, yaw_variance: f64| {
             let expected_m = Vector2::new(0.9, 20.0 + 0.5 * length_m);
-            let (_, noise) = view.centre(
-                [length_m, 1.8],
-                [0.0; 2],
-                expected_m,
-                yaw_variance,
-                Some(0.0),
-            );
+            let (_, noise) = view.centre([length_m, 1.8], [0.0; 2], expected_m, yaw_variance, true);
             libm::sqrt(noise[(0, 0)])
         };
         let sure_m = across_m(4.3, 0.0);
@@ -325,7 +313,7 @@ mod tests {
         let view = View::of(&look, &spots, std::f64::consts::FRAC_PI_2);
         let rear_m = |length_m: f64| {
             let expected_m = Vector2::new(1.2, 25.0 + 0.5 * length_m);
-            let (centre_m, _) = view.centre([length_m, 2.5], [0.1; 2], expected_m, 0.0, Some(0.0));
+            let (centre_m, _) = view.centre([length_m, 2.5], [0.1; 2], expected_m, 0.0, true);
             centre_m.y - 0.5 * length_m
         };
         assert!((rear_m(12.0) - 25.0).abs() < 0.2, "{}", rear_m(12.0));
@@ -346,13 +334,11 @@ mod tests {
             ..Look::at(&spots, &scan, Vector2::zeros())
         };
         let view = View::of(&look, &spots, 0.0);
-        let ahead_m = |gone_m: Option<f64>| {
-            let (centre_m, _) = view.centre([4.3, 1.8], [0.1; 2], look.middle_m, 0.0, gone_m);
+        let ahead_m = |drives: bool| {
+            let (centre_m, _) = view.centre([4.3, 1.8], [0.1; 2], look.middle_m, 0.0, drives);
             centre_m.x - look.middle_m.x
         };
-        for gone_m in [None, Some(1.0)] {
-            assert!(ahead_m(gone_m).abs() < 0.1, "{}", ahead_m(gone_m));
-        }
-        assert!((0.3..0.6).contains(&ahead_m(Some(20.0))));
+        assert!(ahead_m(false).abs() < 0.1, "{}", ahead_m(false));
+        assert!((0.3..0.6).contains(&ahead_m(true)));
     }
 }

@@ -11,7 +11,7 @@ use super::claims::Claims;
 use super::forecast::Forecasts;
 use super::look::Look;
 use super::patches::{Patch, Placer};
-use super::road_user::Track;
+use super::road_user::{GATE, Track};
 use super::spots::{Spot, bounds_m, places_m};
 use super::strays::Strays;
 use super::{Scene, TrackParameters, seam};
@@ -121,6 +121,7 @@ impl Grouping {
     /// Gives every return a group: the track in whose place it lies, or its own patch, if that
     /// can be a road user.
     fn divide(&mut self, tracks: &[Track], scene: &Scene<'_>, parameters: &TrackParameters) {
+        let sensor_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
         self.suspects.clear();
         self.large_patches.clear();
         self.large_patches.resize(tracks.len(), 0);
@@ -169,9 +170,17 @@ impl Grouping {
             let spots = &mut self.spots[begin..];
             let top_m = f64::from(patch.bounds.top_m);
             let fits = |track: usize| fits(spots, top_m, &tracks[track]);
-            if let Some((track, _)) =
-                owner.filter(|(track, at_any_size)| *at_any_size || fits(*track))
-            {
+            // What has moved may be elsewhere than it was expected, and only a part of the patch in its place.
+            let may_be = |track: &usize| {
+                let look = || Look::at(spots, scene.scan, sensor_m);
+                let mover = &tracks[*track];
+                mover.has_moved() && fits(*track) && mover.cost(spots, &look()) < GATE
+            };
+            let mover = self.claims.only().map(|(track, _)| track);
+            let mover =
+                mover.filter(|track| is_whole && owns.is_none() && !is_old && may_be(track));
+            let owner = owner.filter(|(track, at_any_size)| *at_any_size || fits(*track));
+            if let Some(track) = owner.map(|(track, _)| track).or(mover) {
                 for spot in spots.iter_mut() {
                     spot.group = track as u32;
                 }

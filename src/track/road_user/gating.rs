@@ -18,6 +18,10 @@ const MOST_YAW_VARIANCE: f64 = 0.09;
 /// Length of the longest lorries with their trailers (Directive 96/53/EC).
 const LONGEST_M: f64 = 18.75;
 
+/// Cost beyond which a group is not a track: chi-squared of two degrees of freedom at 0.9997,
+/// and the prices for size and spread.
+pub(in crate::track) const GATE: f64 = 16.0;
+
 impl Track {
     /// Longest extent that more of the same object may have, if that is so high.
     pub(in crate::track) fn most_m(&self, top_m: f64) -> [f64; 2] {
@@ -50,7 +54,7 @@ impl Track {
             self.shape.size_deviation_m(vehicle),
             expected_m,
             self.shape.yaw_variance.min(MOST_YAW_VARIANCE),
-            self.is_moving_vehicle().then_some(self.travelled_m),
+            self.is_moving_vehicle(),
         );
         (centre_m, noise + Matrix2::identity() * MIDDLE_M * MIDDLE_M)
     }

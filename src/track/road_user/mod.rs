@@ -30,6 +30,7 @@ use super::trail::Trails;
 use super::view::View;
 use crate::geometry::Rectangle;
 use crate::time::Time;
+pub(super) use gating::GATE;
 use newness::Newness;
 use reunion::Parting;
 
