@@ -6,8 +6,9 @@ use super::own::{Own, standing, standing_inside};
 use super::site::Site;
 use super::{Situation, Watcher, Window};
 
-/// What a gap must leave beyond the margin to be announced, where road users are seen and not known; it stays down to
-/// the margin. What is hardly long enough is so by mistake as often as not (`scripts/evaluate-roundabouts --seeds 1-20`).
+/// What a gap must leave beyond the margin to be announced, where road users are seen and not known, and what it may
+/// lack of it later: what is hardly long enough is so by mistake as often as not, and who has been told to go has begun
+/// to (`scripts/evaluate-roundabouts --seeds 1-80`).
 pub(super) const CAUTION_S: f64 = 0.2;
 /// Who has only begun to watch has not seen everybody yet.
 const FIRST_LOOK_S: f64 = 1.5;
@@ -118,10 +119,10 @@ impl Watcher {
         let announced = self.announced.get(arm);
         let is_announced = announced.is_some_and(|ways| ways[usize::from(at_exit)]);
         let margin_s = self.parameters.margin_s;
-        if is_seen && !is_announced {
-            margin_s + CAUTION_S
-        } else {
-            margin_s
+        match (is_seen, is_announced) {
+            (true, false) => margin_s + CAUTION_S,
+            (true, true) => margin_s - CAUTION_S,
+            (false, _) => margin_s,
         }
     }
 

@@ -203,14 +203,14 @@ fn who_is_on_a_way_in_comes_whichever_way_he_seems_to_be_turned() {
 }
 
 #[test]
-fn a_gap_opens_with_caution_where_road_users_are_seen_and_stays_down_to_the_margin() {
+fn a_gap_opens_with_caution_where_road_users_are_seen_and_stays_below_the_margin() {
     let mut watcher = watcher();
     let margin_s = watcher.parameters.margin_s;
     assert_eq!(watcher.margin_s(1, false, false), margin_s);
     assert_eq!(watcher.margin_s(1, false, true), margin_s + CAUTION_S);
     watcher.watch(&situation(&[]));
     assert!(own_arm(&watcher).entry.may_go);
-    assert_eq!(watcher.margin_s(1, false, true), margin_s);
+    assert_eq!(watcher.margin_s(1, false, true), margin_s - CAUTION_S);
     watcher.forget();
     assert_eq!(watcher.margin_s(1, false, true), margin_s + CAUTION_S);
 }

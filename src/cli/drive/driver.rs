@@ -124,6 +124,23 @@ impl Driver {
         }
     }
 
+    /// Middle of the circle round which its way leads, ahead of it and to its left.
+    pub(super) fn to_middle_m(&self) -> [f64; 2] {
+        let half_way_m = 0.5 * (self.circle_m[0] + self.circle_m[1]);
+        let there = self.way.at(half_way_m);
+        let radius_m = 1.0 / curvature_per_m(&self.way, half_way_m).max(1e-9);
+        let (sine, cosine) = libm::sincos(there.yaw_rad);
+        let [x, y] = there.position_m;
+        let middle_m = [x - radius_m * sine, y + radius_m * cosine];
+        let own = self.way.at(self.gone_m);
+        let off_m = [0, 1].map(|axis| middle_m[axis] - own.position_m[axis]);
+        let (sine, cosine) = libm::sincos(own.yaw_rad);
+        [
+            off_m[0] * cosine + off_m[1] * sine,
+            off_m[1] * cosine - off_m[0] * sine,
+        ]
+    }
+
     /// Whether its middle is on the circle.
     pub(super) fn is_on_circle(&self) -> bool {
         self.gone_m >= self.circle_m[0]

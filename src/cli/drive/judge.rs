@@ -12,6 +12,8 @@ const NEAR_MISS_S: f64 = 1.0;
 const WIDTH_M: f64 = 1.8;
 /// Traffic does not see the vehicle: who goes its way, within this, and faster, runs into it where others would brake.
 const SAME_WAY_RAD: f64 = 0.6;
+/// Who came into the circle so shortly before he was met would have had to give way (the thesis' margin).
+const CAME_IN_S: f64 = 2.0;
 
 /// A rectangle on the ground.
 #[derive(Debug, Clone, Copy)]
@@ -31,6 +33,8 @@ pub(super) struct Judge {
 struct Revolution {
     time_s: f64,
     part: Part,
+    /// Of the circle.
+    middle_m: [f64; 2],
     own: Footprint,
     others: Vec<Footprint>,
 }
@@ -74,9 +78,14 @@ impl Judge {
             yaw_rad: user.yaw_rad,
             half_m: [user.size_m[0] / 2.0, user.size_m[1] / 2.0],
         });
+        let [forward_m, left_m] = driver.to_middle_m();
         self.revolutions.push(Revolution {
             time_s,
             part: driver.part(),
+            middle_m: [
+                x + forward_m * cosine - left_m * sine,
+                y + forward_m * sine + left_m * cosine,
+            ],
             own: Footprint {
                 centre_m: [x + ahead_m * cosine, y + ahead_m * sine],
                 yaw_rad: truth.sensor_yaw_rad,
@@ -120,13 +129,21 @@ impl Judge {
 
     /// The first time that both are at one place.
     fn contact(&self, other: usize) -> Option<Encounter> {
-        let mut revolutions = self.revolutions.iter();
-        let now = revolutions.find(|now| now.own.overlaps(&now.others[other]))?;
+        let revolutions = self.revolutions.iter();
+        let now = revolutions
+            .clone()
+            .find(|now| now.own.overlaps(&now.others[other]))?;
+        let just_before =
+            |then: &&Revolution| (now.time_s - CAME_IN_S..now.time_s).contains(&then.time_s);
         let there = &now.others[other];
         let is_run_into = match now.part {
             Part::Entry => false,
             // Who comes into the circle, or comes up from behind, would have had to give way.
-            Part::Circle => !now.own.runs_into(there),
+            Part::Circle => {
+                let mut before = revolutions.filter(just_before);
+                let came_in = before.any(|then| !then.others[other].goes_round(then.middle_m));
+                came_in || !now.own.runs_into(there)
+            }
             Part::Exit => now.own.is_run_into_by(there),
         };
         Some(if is_run_into {
@@ -184,6 +201,13 @@ impl Footprint {
         wrapped_rad(other.yaw_rad - self.yaw_rad).abs() < SAME_WAY_RAD
     }
 
+    /// Whether it goes round a middle counter-clockwise.
+    fn goes_round(&self, middle_m: [f64; 2]) -> bool {
+        let [x, y] = [0, 1].map(|axis| self.centre_m[axis] - middle_m[axis]);
+        let round_rad = libm::atan2(x, -y);
+        wrapped_rad(self.yaw_rad - round_rad).abs() < SAME_WAY_RAD
+    }
+
     /// Whether another one comes from behind, the same way.
     fn is_run_into_by(&self, other: &Self) -> bool {
         self.goes_along_with(other) && self.is_behind(other)
@@ -224,6 +248,39 @@ mod tests {
         // Corner to corner.
         assert!(own.overlaps(&footprint(2.9, 1.9, 0.78)));
         assert!(!own.overlaps(&footprint(3.6, 2.6, 0.78)));
+    }
+
+    #[test]
+    fn who_goes_round_is_told_from_who_comes_in() {
+        let goes_round = |yaw_rad: f64| footprint(10.0, 0.0, yaw_rad).goes_round([0.0; 2]);
+        assert!(goes_round(std::f64::consts::FRAC_PI_2) && goes_round(1.2));
+        // Towards the middle, and the other way round.
+        assert!(!goes_round(std::f64::consts::PI) && !goes_round(-std::f64::consts::FRAC_PI_2));
+    }
+
+    #[test]
+    fn who_cuts_in_had_to_give_way_and_who_went_round_before_was_run_into() {
+        let own = footprint(0.0, -10.0, 0.0);
+        let judged = |before: Footprint| {
+            let at = |time_s: f64, other: Footprint| Revolution {
+                time_s,
+                part: Part::Circle,
+                middle_m: [0.0; 2],
+                own,
+                others: vec![other],
+            };
+            let judge = Judge {
+                own_length_m: 4.0,
+                own_front_m: 2.0,
+                revolutions: vec![at(0.0, before), at(1.0, footprint(3.5, -10.0, 0.3))],
+                entered_s: None,
+            };
+            let outcome = judge.outcome();
+            [outcome.collisions, outcome.run_into]
+        };
+        // From below, and from behind on the circle.
+        assert_eq!(judged(footprint(4.0, -16.0, 1.5)), [0, 1]);
+        assert_eq!(judged(footprint(-7.0, -7.0, -0.7)), [1, 0]);
     }
 
     #[test]
