@@ -507,6 +507,26 @@ mod tests {
     }
 
     #[test]
+    fn who_moves_has_all_of_what_only_partly_lies_where_he_was_expected() {
+        let mut tracker = ObjectTracker::default();
+        // A rider 20 m away, from 0.1 m up, at 5 m/s, which is 7 columns in each revolution.
+        let rider = |columns: std::ops::Range<usize>| {
+            scan_of(1800, |column, layer| {
+                let is_met = columns.contains(&column) && (5..9).contains(&layer);
+                u16::from(is_met) * 2000
+            })
+        };
+        for revolution in 0..15 {
+            let first = 300 + 7 * revolution;
+            let scan = rider(first..first + 4);
+            see(&mut tracker, &later(&scan, 0.1 * revolution as f64));
+        }
+        // He hastens, and more of him is seen, most of it ahead of where he would be.
+        see(&mut tracker, &later(&rider(413..421), 1.5));
+        assert_eq!((tracker.tracks.len(), tracker.next_id), (1, 1));
+    }
+
+    #[test]
     fn a_lorry_that_comes_out_from_behind_a_house_begins_no_track_for_each_piece() {
         let mut tracker = ObjectTracker::default();
         for revolution in 0..8 {
