@@ -2,6 +2,7 @@
 //! let it go on.
 
 use crate::ego::wrapped_rad;
+use crate::geometry::turned;
 use crate::roundabout::{Advice, ArmAdvice, Crossing, RoundaboutParameters};
 use crate::simulate::Truth;
 use crate::simulate::path::Path;
@@ -135,10 +136,7 @@ impl Driver {
         let own = self.way.at(self.gone_m);
         let off_m = [0, 1].map(|axis| middle_m[axis] - own.position_m[axis]);
         let (sine, cosine) = libm::sincos(own.yaw_rad);
-        [
-            off_m[0] * cosine + off_m[1] * sine,
-            off_m[1] * cosine - off_m[0] * sine,
-        ]
+        turned(&off_m, sine, cosine)
     }
 
     /// Whether its middle is on the circle.

@@ -2,6 +2,7 @@
 
 use super::driver::{Driver, Part};
 use crate::ego::wrapped_rad;
+use crate::geometry::turned;
 use crate::roundabout::RoundaboutParameters;
 use crate::simulate::Truth;
 
@@ -33,7 +34,7 @@ pub(super) struct Judge {
 struct Revolution {
     time_s: f64,
     part: Part,
-    /// Of the circle.
+    /// Middle of the circle, as its driver takes it to lie.
     middle_m: [f64; 2],
     own: Footprint,
     others: Vec<Footprint>,
@@ -78,14 +79,11 @@ impl Judge {
             yaw_rad: user.yaw_rad,
             half_m: [user.size_m[0] / 2.0, user.size_m[1] / 2.0],
         });
-        let [forward_m, left_m] = driver.to_middle_m();
+        let [to_x_m, to_y_m] = turned(&driver.to_middle_m(), -sine, cosine);
         self.revolutions.push(Revolution {
             time_s,
             part: driver.part(),
-            middle_m: [
-                x + forward_m * cosine - left_m * sine,
-                y + forward_m * sine + left_m * cosine,
-            ],
+            middle_m: [x + to_x_m, y + to_y_m],
             own: Footprint {
                 centre_m: [x + ahead_m * cosine, y + ahead_m * sine],
                 yaw_rad: truth.sensor_yaw_rad,
@@ -259,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn who_cuts_in_had_to_give_way_and_who_went_round_before_was_run_into() {
+    fn who_cuts_in_had_to_give_way_and_who_went_round_before_had_not() {
         let own = footprint(0.0, -10.0, 0.0);
         let judged = |before: Footprint| {
             let at = |time_s: f64, other: Footprint| Revolution {

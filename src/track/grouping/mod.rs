@@ -176,10 +176,10 @@ impl Grouping {
                 let mover = &tracks[*track];
                 mover.has_moved() && fits(*track) && mover.cost(spots, &look()) < GATE
             };
+            let owner = owner.filter(|(track, at_any_size)| *at_any_size || fits(*track));
             let mover = self.claims.only().map(|(track, _)| track);
             let mover =
                 mover.filter(|track| is_whole && owns.is_none() && !is_old && may_be(track));
-            let owner = owner.filter(|(track, at_any_size)| *at_any_size || fits(*track));
             if let Some(track) = owner.map(|(track, _)| track).or(mover) {
                 for spot in spots.iter_mut() {
                     spot.group = track as u32;
