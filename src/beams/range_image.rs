@@ -1,6 +1,6 @@
 //! One revolution of the past as a range image: columns by layers.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::Seen;
 use crate::cloud::{Azimuths, CAPACITY, MAX_COLUMNS, MAX_LAYERS, Scan};
@@ -18,30 +18,40 @@ pub(super) struct RangeImage {
     range_m: Vec<f32>,
     /// How far rays went beyond that; empty where pulses have one return.
     reached_m: Vec<f32>,
-    placements: Vec<Placement>,
-    /// Sine and cosine of the columns' azimuths.
-    directions: Vec<[f32; 2]>,
-    /// Which way the sensor looked at the end.
+    columns: Vec<Bearing>,
+    /// Where the sensor was at the end, and which way it looked.
+    origin_m: Vector3<f64>,
     yaw_rad: f64,
-    /// Height of the sensor, and the turn from its axes to level ones.
-    z_m: f64,
-    tilt: Matrix3<f64>,
-    columns_per_rad: f64,
+    columns_per_rad: f32,
     /// Tangents of the layers' elevations, ascending, and how many layers there are.
-    tangents: [f64; MAX_LAYERS],
+    tangents: [f32; MAX_LAYERS],
     layers: usize,
+}
+
+/// Whence and whither a column looked.
+#[derive(Debug, Clone, Copy)]
+struct Bearing {
+    /// Relative to where the sensor was at the end.
+    origin_m: [f32; 2],
+    /// The column's own directions, along its azimuth, to the right of it and along the axis of the sensor, in the odometry
+    /// frame.
+    ahead: [f32; 3],
+    aside: [f32; 3],
+    up: [f32; 3],
 }
 
 /// Metres and part of a range by which a ray must end beyond a place to have passed it, and within which it met something
 /// there: noise of the range, of the pose, and of where surfaces are between rays.
-const MARGIN_M: f64 = 0.25;
-const MARGIN: f64 = 0.01;
+const MARGIN_M: f32 = 0.25;
+const MARGIN: f32 = 0.01;
 /// How far around the box of what moves its returns may be: it goes on during the sweep.
 const AROUND_M: f64 = 0.5;
 /// Of three rays side by side, how many must have passed in the layers above and below.
 const FEWEST_PASSED: u32 = 2;
 /// Part of the step between layers up to which what a ray met reaches up and down.
-const REACH: f64 = 1.3;
+const REACH: f32 = 1.3;
+/// Layers around a place that may have met what is there: more are farther than that.
+const NEIGHBOURS: usize = 4;
 
 impl RangeImage {
     pub(super) fn forget(&mut self) {
@@ -79,29 +89,41 @@ impl RangeImage {
         moving
             .iter()
             .for_each(|rectangle| self.leave_out(scan, rectangle));
-        self.placements.clear();
-        self.placements.reserve(MAX_COLUMNS);
-        self.placements.extend_from_slice(placements);
-        self.directions.clear();
-        self.directions.reserve(MAX_COLUMNS);
-        self.directions
-            .extend((0..scan.columns()).map(|column| scan.direction(column)));
+        let end_m = placements.last().map_or([0.0; 2], Placement::origin_m);
+        self.origin_m = Vector3::new(end_m[0], end_m[1], sweep.attitude.translation_m.z);
         self.yaw_rad = sweep.sensor.yaw_rad;
-        self.z_m = sweep.attitude.translation_m.z;
         let level = Pose {
             position_m: [0.0; 3],
             ..Pose::of(&sweep.attitude)
         };
-        self.tilt = level.rigid().rotation.transpose() * sweep.attitude.rotation;
+        let tilt = level.rigid().rotation.transpose() * sweep.attitude.rotation;
+        self.columns.clear();
+        self.columns.reserve(MAX_COLUMNS);
+        let placed = placements.iter().enumerate();
+        self.columns.extend(placed.map(|(column, placement)| {
+            let [sine, cosine] = scan.direction(column).map(f64::from);
+            let along = |own: Vector3<f64>| {
+                let level = tilt * own;
+                let [x, y] = placement.turned([level.x, level.y]);
+                [x, y, level.z].map(|share| share as f32)
+            };
+            let own_m = placement.origin_m();
+            Bearing {
+                origin_m: [0, 1].map(|axis| (own_m[axis] - end_m[axis]) as f32),
+                ahead: along(Vector3::new(sine, cosine, 0.0)),
+                aside: along(Vector3::new(cosine, -sine, 0.0)),
+                up: along(Vector3::z()),
+            }
+        }));
         self.layers = scan.sensor().elevation_deg.len();
         self.tangents = std::array::from_fn(|layer| {
             if layer < self.layers {
-                scan.slope(layer).0
+                scan.slope(layer).0 as f32
             } else {
-                f64::INFINITY
+                f32::INFINITY
             }
         });
-        self.columns_per_rad = 1.0 / self.azimuths.step_rad();
+        self.columns_per_rad = (1.0 / self.azimuths.step_rad()) as f32;
     }
 
     /// The column that looked where another azimuth points now, of a sensor that looks `yaw_rad`.
@@ -138,105 +160,112 @@ impl RangeImage {
             return Seen::Unknown;
         };
         *guess = column;
-        let square_m2 = from_m.x * from_m.x + from_m.y * from_m.y;
-        let tangent = from_m.z / square_m2.sqrt();
+        let [ahead_m, aside_m, up_m] = from_m;
+        let square_m2 = ahead_m * ahead_m + aside_m * aside_m;
+        let tangent = up_m / square_m2.sqrt();
         // Those beyond the last layer are infinite. Counting all takes less than searching.
-        let below = self.tangents.iter().map(|own| usize::from(*own <= tangent));
-        let above: usize = below.sum();
         let tangents = &self.tangents;
+        let below = tangents.iter().map(|own| u32::from(*own <= tangent));
+        let above = below.sum::<u32>() as usize;
         if above == 0 || above == self.layers {
             return Seen::Unknown;
         }
-        let range_m = (square_m2 + from_m.z * from_m.z).sqrt();
+        let range_m = (square_m2 + up_m * up_m).sqrt();
         let margin_m = MARGIN_M + MARGIN * range_m;
-        let beside = |after| self.azimuths.column_beside(column, after).unwrap_or(column);
-        let place = Place {
-            columns: [-1, 0, 1].map(beside),
-            near_m: (range_m - margin_m) as f32,
-            far_m: (range_m + margin_m) as f32,
-        };
+        let met_m = [range_m - margin_m, range_m + margin_m];
+        let first = above
+            .saturating_sub(NEIGHBOURS / 2)
+            .min(MAX_LAYERS - NEIGHBOURS);
+        let mut answers = Answers::default();
+        for after in [-1, 0, 1] {
+            let column = self.azimuths.column_beside(column, after).unwrap_or(column);
+            let begin = column * MAX_LAYERS + first;
+            let Some(ranges_m) = self.range_m[begin..].first_chunk() else {
+                continue;
+            };
+            let reached_m = self
+                .reached_m
+                .get(begin..)
+                .and_then(|all| all.first_chunk());
+            answers.add(ranges_m, reached_m.unwrap_or(ranges_m), met_m);
+        }
         let reach = REACH * (tangents[above] - tangents[above - 1]);
-        let is_near = |layer: &usize| (tangents[*layer] - tangent).abs() < reach;
-        let farther = [above.wrapping_sub(2), above + 1];
-        let farther = farther
-            .into_iter()
-            .filter(|layer| *layer < self.layers && is_near(layer));
-        let [below, above] = [above - 1, above].map(|layer| self.ask(layer, &place));
-        if below.met || above.met || farther.into_iter().any(|layer| self.ask(layer, &place).met) {
+        let is_near = |layer: usize| (tangents[first + layer] - tangent).abs() < reach;
+        if (0..NEIGHBOURS).any(|layer| answers.met[layer] > 0 && is_near(layer)) {
             Seen::Occupied
-        } else if [below, above].iter().all(Answer::has_passed) {
+        } else if [above - 1, above]
+            .iter()
+            .all(|layer| answers.has_passed(layer - first))
+        {
             Seen::Empty
         } else {
             Seen::Unknown
         }
     }
 
-    /// The column that looked at a place, and where the place is from its sensor, beginning with a guess.
-    fn find(&self, at_m: &Vector3<f64>, guess: usize) -> Option<(usize, Vector3<f64>)> {
+    /// The column that looked at a place, and where the place is from the sensor along the directions of about that column,
+    /// beginning with a guess.
+    fn find(&self, at_m: &Vector3<f64>, guess: usize) -> Option<(usize, [f32; 3])> {
         /// Where the sensor was by then depends on the column, but by nothing that counts for one so near to the guess.
-        const NEAR: f64 = 0.1;
+        const NEAR: f32 = 0.1;
         let mut column = guess.min(self.azimuths.columns() - 1);
+        let [x, y, z]: [f32; 3] = (at_m - self.origin_m).map(|metres| metres as f32).into();
         for _ in 0..2 {
-            let [x, y] = self.placements[column].sensor_m([at_m.x, at_m.y]);
-            let from_m = self.tilt.tr_mul(&Vector3::new(x, y, at_m.z - self.z_m));
-            let [sine, cosine] = self.directions[column].map(f64::from);
-            let ahead_m = from_m.x * sine + from_m.y * cosine;
-            let aside = (from_m.x * cosine - from_m.y * sine) / ahead_m;
-            if ahead_m > 0.0 && aside.abs() < NEAR {
+            let own = &self.columns[column];
+            let from_m = [x - own.origin_m[0], y - own.origin_m[1], z];
+            let along_m =
+                |way: &[f32; 3]| way[0] * from_m[0] + way[1] * from_m[1] + way[2] * from_m[2];
+            let (ahead_m, aside_m) = (along_m(&own.ahead), along_m(&own.aside));
+            let aside = aside_m / ahead_m;
+            let is_near = ahead_m > 0.0 && aside.abs() < NEAR;
+            let turn_rad = if is_near {
                 // The arc tangent, to 2e-6.
-                let turn_rad = aside - aside * aside * aside / 3.0;
-                let after = turn_rad * self.columns_per_rad;
-                let after = (after + libm::copysign(0.5, after)) as isize;
-                let column = self.azimuths.column_beside(column, after)?;
-                return Some((column, from_m));
+                aside - aside * aside * aside / 3.0
+            } else {
+                libm::atan2f(aside_m, ahead_m)
+            };
+            let after = turn_rad * self.columns_per_rad;
+            column = self
+                .azimuths
+                .column_beside(column, (after + 0.5_f32.copysign(after)) as isize)?;
+            if is_near {
+                return Some((column, [ahead_m, aside_m, along_m(&own.up)]));
             }
-            column = self.azimuths.column_at(libm::atan2(from_m.x, from_m.y));
         }
         None
     }
-
-    /// What the rays of a layer around a place say of it.
-    fn ask(&self, layer: usize, place: &Place) -> Answer {
-        let mut answer = Answer::default();
-        for column in place.columns {
-            let point = column * MAX_LAYERS + layer;
-            let range_m = self.range_m[point];
-            let reached_m = self
-                .reached_m
-                .get(point)
-                .map_or(range_m, |reached_m| *reached_m);
-            let met = place.near_m..=place.far_m;
-            if range_m.abs() > place.far_m {
-                answer.passed += 1;
-            } else if met.contains(&range_m) || met.contains(&reached_m) {
-                answer.met = true;
-            } else if reached_m > place.far_m {
-                answer.passed += 1;
-            } else if range_m > 0.0 {
-                answer.is_blocked = true;
-            }
-        }
-        answer
-    }
 }
 
-/// Where a place is: in which column and those beside it, and nearer and farther by the margin.
-struct Place {
-    columns: [usize; 3],
-    near_m: f32,
-    far_m: f32,
-}
-
-/// What some rays say.
+/// What some rays say of each layer around a place: how many passed it, met something there, or something before it.
 #[derive(Debug, Clone, Copy, Default)]
-struct Answer {
-    passed: u32,
-    met: bool,
-    is_blocked: bool,
+struct Answers {
+    passed: [u32; NEIGHBOURS],
+    met: [u32; NEIGHBOURS],
+    blocked: [u32; NEIGHBOURS],
 }
 
-impl Answer {
-    fn has_passed(&self) -> bool {
-        !self.is_blocked && self.passed >= FEWEST_PASSED
+impl Answers {
+    /// Adds what the rays of a column say that met something at some ranges and went on to others, of what is within `met_m`.
+    #[inline(always)]
+    fn add(
+        &mut self,
+        ranges_m: &[f32; NEIGHBOURS],
+        reached_m: &[f32; NEIGHBOURS],
+        [near_m, far_m]: [f32; 2],
+    ) {
+        for layer in 0..NEIGHBOURS {
+            let (range_m, reached_m) = (ranges_m[layer], reached_m[layer]);
+            let is_there = |metres: f32| u32::from(near_m <= metres) & u32::from(metres <= far_m);
+            let is_beyond = u32::from(range_m.abs() > far_m);
+            let met = (is_there(range_m) | is_there(reached_m)) & (is_beyond ^ 1);
+            let passed = is_beyond | (u32::from(reached_m > far_m) & (met ^ 1));
+            self.met[layer] += met;
+            self.passed[layer] += passed;
+            self.blocked[layer] += u32::from(range_m > 0.0) & ((met | passed) ^ 1);
+        }
+    }
+
+    fn has_passed(&self, layer: usize) -> bool {
+        self.blocked[layer] == 0 && self.passed[layer] >= FEWEST_PASSED
     }
 }

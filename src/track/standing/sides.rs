@@ -6,6 +6,7 @@
 //! from what a good one told. What nobody saw is a car's, and lies behind.
 
 use std::f64::consts::FRAC_PI_2;
+use std::sync::LazyLock;
 
 use crate::ego::wrapped_rad;
 use crate::geometry::{DIRECTIONS, Extent, Rectangle, closest_rad, mean_closeness, turned};
@@ -106,10 +107,12 @@ impl Sides {
     fn fit(&self, sensor_m: [f64; 2]) -> Rectangle {
         let yaw_rad = closest_rad(&self.closeness);
         let (sine, cosine) = libm::sincos(yaw_rad);
+        let extents = self.looks.each_ref().map(|look| Shown {
+            extent: Extent::of(look.places_m.iter().copied(), sine, cosine),
+            worth: look.worth,
+        });
         let end_m = |end: fn(&Extent) -> [f64; 2]| {
-            let of =
-                |look: &Outermost| end(&Extent::of(look.places_m.iter().copied(), sine, cosine));
-            [0, 1].map(|axis| usual_m(&self.looks, |look| of(look)[axis]))
+            [0, 1].map(|axis| usual_m(&extents, |extent| end(extent)[axis]))
         };
         let (low_m, high_m) = (end_m(|extent| extent.low), end_m(|extent| extent.high));
         let seen_m = [0, 1].map(|axis| high_m[axis] - low_m[axis]);
@@ -146,24 +149,43 @@ impl Sides {
 
 impl Outermost {
     fn of(places_m: &[[f64; 2]], [x_m, y_m]: [f64; 2]) -> Self {
-        let outermost_m = |way: usize| {
-            let (sine, cosine) = libm::sincos(4.0 * FRAC_PI_2 * way as f64 / WAYS as f64);
-            let ahead_m = |place_m: &[f64; 2]| turned(place_m, sine, cosine)[0];
-            let farthest = places_m
-                .iter()
-                .max_by(|a, b| ahead_m(a).total_cmp(&ahead_m(b)));
-            farthest.map_or([x_m, y_m], |[x, y]| [x_m + x, y_m + y])
-        };
+        let mut outermost_m = [[0.0; 2]; WAYS];
+        let (ahead_m, behind_m) = outermost_m.split_at_mut(WAYS / 2);
+        for ((sine, cosine), ends_m) in AHEAD.iter().zip(ahead_m.iter_mut().zip(behind_m)) {
+            let (mut farthest_m, mut nearest_m) = (f64::NEG_INFINITY, f64::INFINITY);
+            for place_m in places_m {
+                let along_m = turned(place_m, *sine, *cosine)[0];
+                if along_m > farthest_m {
+                    (farthest_m, *ends_m.0) = (along_m, *place_m);
+                }
+                if along_m < nearest_m {
+                    (nearest_m, *ends_m.1) = (along_m, *place_m);
+                }
+            }
+        }
         Self {
-            places_m: std::array::from_fn(outermost_m),
+            places_m: outermost_m.map(|[x, y]| [x_m + x, y_m + y]),
             worth: places_m.len() as f64,
         }
     }
 }
 
+/// Sines and cosines of the ways ahead; the others are opposite to them.
+static AHEAD: LazyLock<[(f64, f64); WAYS / 2]> = LazyLock::new(|| {
+    std::array::from_fn(|way| libm::sincos(4.0 * FRAC_PI_2 * way as f64 / WAYS as f64))
+});
+
+/// How far one look reaches, and what it counts.
+struct Shown {
+    extent: Extent,
+    worth: f64,
+}
+
 /// The median of what looks show, each counted by its worth.
-fn usual_m(looks: &[Outermost; MOST_LOOKS], shown_m: impl Fn(&Outermost) -> f64) -> f64 {
-    let mut shown = looks.each_ref().map(|look| (shown_m(look), look.worth));
+fn usual_m(looks: &[Shown; MOST_LOOKS], end_m: impl Fn(&Extent) -> f64) -> f64 {
+    let mut shown = looks
+        .each_ref()
+        .map(|look| (end_m(&look.extent), look.worth));
     shown.sort_by(|a, b| a.0.total_cmp(&b.0));
     let half = 0.5 * shown.iter().map(|(_, worth)| worth).sum::<f64>();
     let mut worth = 0.0;
