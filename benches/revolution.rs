@@ -2,7 +2,7 @@
 //! and on what a parked car saw (where the shared data is), on the simulated street with its poses,
 //! at a roundabout with and without its map, and on a worst case.
 //! The steps are timed where they work, one after the other, with the caches as the others left
-//! them.
+//! them. What the odometry does once the answer is out counts with the grid.
 //!
 //! Beside microseconds each figure is given in passes: how often a plain polar-to-Cartesian pass
 //! over the same array would fit into it, measured in the same run, so that figures compare

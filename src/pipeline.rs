@@ -223,9 +223,10 @@ impl Pipeline {
         self.publisher.frames()
     }
 
-    /// Takes the last revolution into the map; to be called once for each. It is less urgent
-    /// than the objects.
+    /// Takes the last revolution into the map, and into that of the odometry; to be called once for
+    /// each. It is less urgent than the objects.
     pub fn update_map(&mut self) {
+        self.ego.settle();
         let Some(last) = &self.last else { return };
         self.grid.process(&Perceived {
             scan: &self.scan,

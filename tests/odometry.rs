@@ -123,6 +123,16 @@ fn a_drive_that_begins_between_hedges_and_walls_is_not_taken_for_standing() {
 }
 
 #[test]
+fn what_is_settled_after_the_answer_or_before_the_next_one_is_the_same() {
+    let (mut early, mut late) = (pipeline(), pipeline());
+    for turn in drive("strangers", 605, 25) {
+        let place = feed(&mut late, &turn, false);
+        assert_eq!(feed(&mut early, &turn, false), place);
+        early.update_map();
+    }
+}
+
+#[test]
 fn a_standing_sensor_among_traffic_stays_where_it_is() {
     let mut pipeline = pipeline();
     for turn in drive("standing", 5, 150) {

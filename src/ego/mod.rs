@@ -222,11 +222,17 @@ impl Ego {
     }
 
     /// Where the sensor is expected at the end of a scan.
-    pub fn expect(&self, scan: &Scan) -> Sweep {
+    pub fn expect(&mut self, scan: &Scan) -> Sweep {
+        self.settle();
         Sweep {
             sensor: Pose::of(&self.odometry.expected(scan)),
-            ..Sweep::still(self.epoch)
+            ..Sweep::still(self.whole_epoch())
         }
+    }
+
+    /// Counts the frames that began anew, for whatever reason.
+    fn whole_epoch(&self) -> u32 {
+        self.epoch.wrapping_add(self.odometry.epoch())
     }
 
     /// Takes a scan in, and tells where the sensor was meanwhile. What `moving` boxes hold, in the sensor frame at the end
@@ -296,11 +302,21 @@ impl Ego {
         self.sweep(scan)
     }
 
+    /// Does what the answer to the last revolution need not wait for ([`Odometry::settle`]).
+    pub fn settle(&mut self) {
+        self.odometry.settle();
+    }
+
     /// Marks the columns in which something that moves may be.
     fn mark(&mut self, scan: &Scan, moving: &[Rectangle]) {
         self.marked.clear();
         self.marked.resize(scan.columns(), false);
         self.outlines.clear();
+        let moving = if self.odometry.was_lost() {
+            &[]
+        } else {
+            moving
+        };
         self.outlines.extend(moving.iter().map(Rectangle::outline));
         for rectangle in moving {
             match scan.columns_across(&rectangle.corners()) {
@@ -337,7 +353,7 @@ impl Ego {
         Sweep {
             frame,
             reference: self.sources.reference().filter(|_| frame == Frame::Earth),
-            epoch: self.epoch.wrapping_add(self.odometry.epoch()),
+            epoch: self.whole_epoch(),
             vehicle: Some(self.parameters.vehicle(&anchor.pose(&sensor))),
             sensor,
             attitude,

@@ -62,6 +62,8 @@ pub struct Odometry {
     /// How well what is upright usually fits.
     usual_agreement: Agreement,
     report: OdometryReport,
+    /// What waits for [`Odometry::settle`].
+    unsettled: Option<Unsettled>,
 }
 
 /// How much is known.
@@ -75,6 +77,15 @@ enum State {
     Following,
     /// So many revolutions in a row did not fit.
     Lost(u32),
+}
+
+/// What is still to be done with a revolution.
+#[derive(Debug, Clone, Copy)]
+struct Unsettled {
+    /// From where and how it was aligned, while the frame is young.
+    doubtful: Option<(Motion, Attempt)>,
+    /// It fits, and is one for the map.
+    fits: bool,
 }
 
 /// What may have become of a revolution.
@@ -127,6 +138,7 @@ impl Default for Odometry {
             usual_off_m: FIRST_OFF_M,
             usual_agreement: Agreement::default(),
             report: OdometryReport::default(),
+            unsettled: None,
         }
     }
 }
@@ -142,6 +154,7 @@ impl Odometry {
         self.map.clear();
         self.state = State::New;
         (self.usual_off_m, self.usual_agreement) = (FIRST_OFF_M, Agreement::default());
+        self.unsettled = None;
     }
 
     /// Whether the next scan begins a frame.
@@ -156,6 +169,7 @@ impl Odometry {
 
     /// Goes on to the middle of a scan, for [`Odometry::guide`] and [`Odometry::process`].
     pub fn predict(&mut self, scan: &Scan) {
+        self.settle();
         let middle = scan.time() + Span::from_seconds(-0.5 * scan.duration_s());
         self.passed_s = self.time.map_or(0.0, |last| (middle - last).seconds());
         self.time = Some(middle);
@@ -206,28 +220,45 @@ impl Odometry {
         }
         let predicted = self.motion;
         let mut attempt = self.attempt(predicted);
+        let mut doubtful = None;
         if self.state == State::Begun {
             attempt = self.search(predicted, attempt, Reach::Anywhere);
         } else if !self.is_usual(&attempt) {
             attempt = self.search(predicted, attempt, Reach::Jerk);
-        } else if self.doubts(predicted, &attempt) {
-            self.begin_anew();
-            return;
+        } else if self.is_young() {
+            doubtful = Some((predicted, attempt));
         }
-        self.take(scan, &attempt);
+        let fits = self.take(scan, &attempt);
+        self.unsettled = (self.state != State::New).then_some(Unsettled { doubtful, fits });
+    }
+
+    /// Does what the last revolution's motion need not wait for: doubts it while the frame is young, and takes it into the map.
+    /// Without it, the next revolution begins with this.
+    pub fn settle(&mut self) {
+        let Some(unsettled) = self.unsettled.take() else {
+            return;
+        };
+        let is_doubted = |(predicted, attempt)| self.doubts(predicted, &attempt);
+        if unsettled.doubtful.is_some_and(is_doubted) {
+            self.begin_anew();
+        } else if unsettled.fits {
+            self.map.add(&self.view, &self.motion.pose);
+        }
+    }
+
+    /// Whether the frame is so young that its motion is doubted.
+    fn is_young(&self) -> bool {
+        /// Revolutions in which it is asked.
+        const YOUNG: u32 = 20;
+        !self.is_led && self.followed < YOUNG
     }
 
     /// Whether a revolution of a young frame fits another motion better, as the one before it did: along a wall little tells them
     /// apart where it begins, and what is added to the map from a wrong place contradicts it. Without this strangers 605 and 789
     /// are taken for standing (`tests/odometry.rs`).
     fn doubts(&mut self, predicted: Motion, attempt: &Attempt) -> bool {
-        /// Revolutions in which it is asked.
-        const YOUNG: u32 = 20;
         /// So often in a row is no accident.
         const OFTEN: u32 = 2;
-        if self.is_led || self.followed >= YOUNG {
-            return false;
-        }
         self.followed += 1;
         let skewed = self.skewed;
         let other = self.search(predicted, *attempt, Reach::Anywhere);
@@ -238,6 +269,11 @@ impl Odometry {
             0
         };
         self.doubted >= OFTEN
+    }
+
+    /// Whether the sensor was lost a moment ago: what seemed to move by a wrong motion may stand.
+    pub fn was_lost(&self) -> bool {
+        self.epoch > 0 && self.is_young()
     }
 
     /// Looks at more columns in the next revolution where little is seen, and at less where much is.
@@ -295,8 +331,8 @@ impl Odometry {
         })
     }
 
-    /// Makes an attempt the motion, and takes the revolution into the map if it fits.
-    fn take(&mut self, scan: &Scan, attempt: &Attempt) {
+    /// Makes an attempt the motion, if it fits, and tells whether the revolution is one for the map.
+    fn take(&mut self, scan: &Scan, attempt: &Attempt) -> bool {
         let alignment = &attempt.alignment;
         self.report = OdometryReport {
             features: self.view.surfaces.len(),
@@ -318,7 +354,7 @@ impl Odometry {
         }
         if !fits || !self.is_usual(attempt) {
             self.lose();
-            return;
+            return false;
         }
         self.usual_off_m += FRESH * (alignment.off_m - self.usual_off_m);
         if let Some(agreement) = attempt.alignment.agreement {
@@ -333,7 +369,7 @@ impl Odometry {
             self.map.clear();
         }
         self.state = State::Following;
-        self.map.add(&self.view, &self.motion.pose);
+        true
     }
 
     /// Counts a revolution that does not fit the map, and begins another map when there were too many.
