@@ -46,7 +46,7 @@ const FARTHEST_M: f32 = 70.0;
 /// No ground is higher than this above the steepest slope.
 const HIGHEST_M: f32 = 0.5;
 /// A rise from one return to the next above that no road has.
-const STEEP: f32 = 1.0;
+pub(super) const STEEP: f32 = 1.0;
 
 impl Lowest {
     pub(super) fn new() -> Self {

@@ -2,9 +2,10 @@
 
 use nalgebra::Vector3;
 
+use super::lowest::STEEP;
 use super::moments::{Positions, moments_near};
 use super::slices::slices;
-use super::{Plane, passes};
+use super::{GroundParameters, Plane, passes};
 use crate::cloud::{MAX_COLUMNS, MAX_LAYERS, Scan};
 use crate::float::least_of;
 
@@ -37,15 +38,14 @@ impl Minima {
         }
     }
 
-    /// Gathers the returns of each slice that are lowest above `reference`, within `range_m`, in
-    /// the first of each `every` columns of a slice.
-    pub(super) fn gather(&mut self, scan: &Scan, reference: &Plane, range_m: f64, every: usize) {
+    /// Gathers the returns of each slice that are lowest above `reference` and may be ground.
+    pub(super) fn gather(&mut self, scan: &Scan, reference: &Plane, parameters: &GroundParameters) {
         for segment in &mut self.segments {
             segment.clear();
         }
-        let far_squared = (range_m * range_m) as f32;
+        let far_squared = parameters.candidate_range_m.powi(2) as f32;
         for (slice, columns) in slices(scan, self.segments.len()) {
-            let columns = columns.step_by(every);
+            let columns = columns.step_by(parameters.candidate_every);
             self.heights_m.resize(columns.len(), [0.0; MAX_LAYERS]);
             let heights_m = &mut self.heights_m;
             passes::heights_nearby(scan, columns.clone(), reference, far_squared, heights_m);
@@ -55,7 +55,12 @@ impl Minima {
                 if least_of(*heights_m) >= highest_m {
                     continue;
                 }
-                for (layer, above_m) in heights_m.iter().copied().enumerate() {
+                let layers = if parameters.candidate_below_upright {
+                    layers_below_upright(scan, column, heights_m)
+                } else {
+                    MAX_LAYERS
+                };
+                for (layer, above_m) in heights_m[..layers].iter().copied().enumerate() {
                     if above_m < highest_m {
                         let point = scan.index(column, layer) as u32;
                         insert(segment, self.per_segment, Minimum { above_m, point });
@@ -106,6 +111,22 @@ impl Minima {
     }
 }
 
+/// How many layers of a column are below the first return from which it rises steeply to the next
+/// one above.
+fn layers_below_upright(scan: &Scan, column: usize, heights_m: &[f32; MAX_LAYERS]) -> usize {
+    let stands = |layer: usize| {
+        let [(height_m, distance_m), (next_m, next_distance_m)] = [layer, layer + 1].map(|layer| {
+            let point = scan.index(column, layer);
+            (heights_m[layer], scan.distance_m(point))
+        });
+        let are_met = height_m.is_finite() && next_m.is_finite();
+        are_met && next_m - height_m > STEEP * (next_distance_m - distance_m)
+    };
+    (0..MAX_LAYERS - 1)
+        .find(|layer| stands(*layer))
+        .unwrap_or(MAX_LAYERS)
+}
+
 /// What is as high as this does not belong to the lowest.
 fn highest_m(minima: &[Minimum], capacity: usize) -> f32 {
     let highest = minima.get(capacity - 1);
@@ -128,6 +149,36 @@ fn insert(minima: &mut Vec<Minimum>, capacity: usize, minimum: Minimum) {
 mod tests {
     use super::*;
     use crate::cloud::tests::scan_of;
+    use crate::parameter::Profile;
+
+    /// Of so many columns one is looked at, whatever stands there.
+    fn every(columns: usize) -> GroundParameters {
+        GroundParameters {
+            candidate_every: columns,
+            candidate_below_upright: false,
+            ..GroundParameters::profile(Profile::Default)
+        }
+    }
+
+    #[test]
+    fn what_stands_upright_and_all_above_it_is_not_among_the_lowest() {
+        // 0.8 m above a floor, between a wall 1.5 m away, before which no ray reaches the floor, and one 6 m away.
+        let scan = scan_of(360, |column, layer| {
+            let (sine, cosine) = (2.0 * layer as f64 - 15.0).to_radians().sin_cos();
+            let wall_m = if column < 180 { 1.5 } else { 6.0 };
+            let floor_m = if sine < 0.0 { -0.8 / sine } else { f64::MAX };
+            (100.0 * floor_m.min(wall_m / cosine)) as u16
+        });
+        let parameters = GroundParameters {
+            candidate_below_upright: true,
+            ..every(1)
+        };
+        let mut minima = Minima::new(36, 6);
+        minima.gather(&scan, &Plane::level(0.0), &parameters);
+        let mut lowest = (0..minima.len()).map(|number| minima.get(number).1);
+        assert_eq!(minima.len(), 18 * 6);
+        assert!(lowest.all(|at_m| (at_m.z + 0.8).abs() < 0.02 && at_m.x.hypot(at_m.y) < 6.0));
+    }
 
     #[test]
     fn every_slice_gives_its_lowest_returns_and_nothing_beyond_the_range() {
@@ -142,7 +193,7 @@ mod tests {
             }
         });
         let mut minima = Minima::new(36, 10);
-        minima.gather(&scan, &Plane::level(0.0), 25.0, 1);
+        minima.gather(&scan, &Plane::level(0.0), &every(1));
         assert_eq!(minima.len(), 18 * 10);
         let lowest = |segment| {
             let of_slice = (0..minima.len())
@@ -163,7 +214,7 @@ mod tests {
             |column, _| if column % 10 % 4 == 0 { 900 } else { 500 },
         );
         let mut minima = Minima::new(36, 64);
-        minima.gather(&scan, &Plane::level(0.0), 25.0, 4);
+        minima.gather(&scan, &Plane::level(0.0), &every(4));
         // Ten columns of a slice, of which three are looked at.
         assert_eq!(minima.len(), 36 * 3 * MAX_LAYERS);
         let mut ranges_m = (0..minima.len()).map(|n| minima.get(n).1.norm());

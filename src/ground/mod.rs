@@ -68,6 +68,9 @@ parameters! {
         candidate_range_m: f64 = 25.0, thesis 130.0, in 5.0..=200.0, "m";
         /// Of so many columns one is looked at for lowest returns: neighbours meet the same road.
         candidate_every: usize = 4, thesis 1, in 1..=16, "columns";
+        /// Whether lowest returns are sought below what stands upright alone: the foot of a wall
+        /// near the sensor is the lowest that is seen there, and no road.
+        candidate_below_upright: bool = true, thesis false, "";
         /// Random draws of three returns.
         iterations: usize = 50, in 1..=1000, "";
         /// Distance to a candidate plane within which a lowest return supports it.
@@ -201,12 +204,7 @@ impl Ground {
     pub fn process(&mut self, scan: &Scan, vehicles: &[Rectangle]) -> GroundReport {
         let followed = self.last.filter(|_| self.parameters.follow);
         let reference = followed.unwrap_or(Plane::level(0.0));
-        self.minima.gather(
-            scan,
-            &reference,
-            self.parameters.candidate_range_m,
-            self.parameters.candidate_every,
-        );
+        self.minima.gather(scan, &reference, &self.parameters);
         let mut random = Random::new(self.parameters.seed as u64 ^ self.revolutions << 20);
         let near = followed.filter(|_| self.misses < self.parameters.follow_patience);
         let found = ransac::find(&self.minima, near.as_ref(), &self.parameters, &mut random);

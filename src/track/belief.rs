@@ -7,6 +7,7 @@
 use std::ops::RangeInclusive;
 
 use super::Class;
+use super::look::{COVERED_M, OUT_OF_VIEW_M};
 use super::profiles::{PROFILES, ROAD_USERS, Within};
 
 /// What was measured of an object over its life.
@@ -67,7 +68,7 @@ impl Qualities {
         const LEAST_LEGS_M: f64 = 0.13;
         let is_upright = self.points >= FEWEST
             && HEIGHT_M.contains(&self.top_m)
-            && self.top_below_m < PASSED_BELOW_M
+            && (self.top_below_m < PASSED_BELOW_M || self.top_below_m == OUT_OF_VIEW_M)
             && self.long_m > LEAST_SHOULDERS_M
             && self.short_m > LEAST_DEPTH_M
             && self.lower_m.is_none_or(|lower_m| lower_m > LEAST_LEGS_M);
@@ -157,8 +158,11 @@ impl Belief {
             };
             let sized = |own: &Within| Within(own.0, own.1.max(longest_m), own.2);
             let long_m = Within(shortest_m, profile.long_m.1, profile.long_m.2);
-            // What goes on above the highest layer is rather a house than a vehicle.
-            let endless = if qualities.top_below_m == f64::MAX {
+            // What goes on above the highest layer is rather a house than a vehicle, but people do near
+            // the sensor.
+            let endless = if qualities.top_below_m == COVERED_M
+                || (qualities.top_below_m == OUT_OF_VIEW_M && !is_thin)
+            {
                 ENDLESS_LOG
             } else {
                 0.0
@@ -310,7 +314,7 @@ fn known(within: &Within, value: Option<f64>) -> f64 {
 const FLAT_M: Within = Within(0.25, 3.0, 0.07);
 const DEEP_M: Within = Within(0.6, 3.0, 0.13);
 const MANY: usize = 60;
-/// Of a road user that reaches out of the sensor's view.
+/// Of a road user that reaches out of the sensor's view, or behind something nearer.
 const ENDLESS_LOG: f64 = -1.5;
 /// Greatest width and depth of people who walk side by side, and how much rarer they are.
 const GROUP_WIDTH_M: f64 = 2.3;
@@ -367,6 +371,29 @@ mod tests {
             !matches!(moves.class().0, Class::Car | Class::Cyclist),
             "{moves:?}"
         );
+    }
+
+    #[test]
+    fn who_stands_so_near_that_no_ray_passes_over_him_is_a_person_and_behind_something_nobody_knows()
+     {
+        let near = Qualities {
+            long_m: 0.55,
+            short_m: 0.35,
+            upper_m: Some(0.5),
+            top_m: 1.4,
+            top_below_m: OUT_OF_VIEW_M,
+            range_m: 2.0,
+            points: 700,
+            ..CAR
+        };
+        let behind = Qualities {
+            top_below_m: COVERED_M,
+            ..near
+        };
+        let [near, behind] = [near, behind].map(|qualities| Belief::of(&qualities));
+        assert_eq!(near.class().0, Class::Pedestrian);
+        assert!(near.road_user() > 0.6, "{near:?}");
+        assert!(behind.road_user() < 0.3, "{behind:?}");
     }
 
     #[test]

@@ -156,12 +156,20 @@ fn may_be_upright(spots: &[Spot], scan: &Scan, range_m: f64) -> bool {
     layers.count_ones() > 1 || step_m > LOWEST_M
 }
 
-/// Where the next ray passed over the topmost point of something, so high above the ground and so far away; as high as
-/// can be where something hides that, or no ray is higher.
+/// Where no ray passed over something, since something nearer hides what is above it.
+pub(super) const COVERED_M: f64 = f64::MAX;
+/// Where none did, since the highest ray meets it.
+pub(super) const OUT_OF_VIEW_M: f64 = f64::INFINITY;
+
+/// Where the next ray passed over the topmost point of something, so high above the ground and so far away: [`COVERED_M`]
+/// or [`OUT_OF_VIEW_M`] where none did.
 pub(super) fn passed_m(scan: &Scan, top_point: usize, top_m: f64, range_m: f64) -> f64 {
     let layer = scan.layer(top_point);
-    if layer + 1 == MAX_LAYERS || is_covered(scan, top_point) {
-        return f64::MAX;
+    if layer + 1 == MAX_LAYERS {
+        return OUT_OF_VIEW_M;
+    }
+    if is_covered(scan, top_point) {
+        return COVERED_M;
     }
     top_m + range_m * (scan.slope(layer + 1).0 - scan.slope(layer).0)
 }
