@@ -221,7 +221,7 @@ impl Ego {
         self.sources.hear(envelope)
     }
 
-    /// Where the sensor is expected at the end of a scan.
+    /// Where the sensor is expected at the end of a scan, once the last one is settled.
     pub fn expect(&mut self, scan: &Scan) -> Sweep {
         self.settle();
         Sweep {

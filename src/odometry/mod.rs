@@ -2,10 +2,11 @@
 //!
 //! `features` and `poles` pick returns that tell something, `map` keeps what stands: `surfaces` and `uprights` in
 //! `cells`. `registration` finds the pose from which the one lies on the other, `motion` knows where that must be
-//! about, and `search` looks farther where the sensor was jerked.
+//! about, `search` looks farther where the sensor was jerked, and `doubts` asks it whether the first motion was right.
 //! This file takes a revolution through them, in the manner of KISS-ICP (Vizzo et al. 2023).
 
 mod cells;
+mod doubts;
 mod features;
 mod guide;
 mod map;
@@ -22,6 +23,7 @@ use nalgebra::{Vector3, Vector6};
 use crate::cloud::Scan;
 use crate::geometry::{self, Rigid};
 use crate::time::{Span, Time};
+use doubts::Unsettled;
 use features::Feature;
 use map::{Map, View};
 use motion::Motion;
@@ -77,15 +79,6 @@ enum State {
     Following,
     /// So many revolutions in a row did not fit.
     Lost(u32),
-}
-
-/// What is still to be done with a revolution.
-#[derive(Debug, Clone, Copy)]
-struct Unsettled {
-    /// From where and how it was aligned, while the frame is young.
-    doubtful: Option<(Motion, Attempt)>,
-    /// It fits, and is one for the map.
-    fits: bool,
 }
 
 /// What may have become of a revolution.
@@ -230,50 +223,6 @@ impl Odometry {
         }
         let fits = self.take(scan, &attempt);
         self.unsettled = (self.state != State::New).then_some(Unsettled { doubtful, fits });
-    }
-
-    /// Does what the last revolution's motion need not wait for: doubts it while the frame is young, and takes it into the map.
-    /// Without it, the next revolution begins with this.
-    pub fn settle(&mut self) {
-        let Some(unsettled) = self.unsettled.take() else {
-            return;
-        };
-        let is_doubted = |(predicted, attempt)| self.doubts(predicted, &attempt);
-        if unsettled.doubtful.is_some_and(is_doubted) {
-            self.begin_anew();
-        } else if unsettled.fits {
-            self.map.add(&self.view, &self.motion.pose);
-        }
-    }
-
-    /// Whether the frame is so young that its motion is doubted.
-    fn is_young(&self) -> bool {
-        /// Revolutions in which it is asked.
-        const YOUNG: u32 = 20;
-        !self.is_led && self.followed < YOUNG
-    }
-
-    /// Whether a revolution of a young frame fits another motion better, as the one before it did: along a wall little tells them
-    /// apart where it begins, and what is added to the map from a wrong place contradicts it. Without this strangers 605 and 789
-    /// are taken for standing (`tests/odometry.rs`).
-    fn doubts(&mut self, predicted: Motion, attempt: &Attempt) -> bool {
-        /// So often in a row is no accident.
-        const OFTEN: u32 = 2;
-        self.followed += 1;
-        let skewed = self.skewed;
-        let other = self.search(predicted, *attempt, Reach::Anywhere);
-        self.unskew(&skewed);
-        self.doubted = if search::is_other(&other, attempt) {
-            self.doubted + 1
-        } else {
-            0
-        };
-        self.doubted >= OFTEN
-    }
-
-    /// Whether the sensor was lost a moment ago: what seemed to move by a wrong motion may stand.
-    pub fn was_lost(&self) -> bool {
-        self.epoch > 0 && self.is_young()
     }
 
     /// Looks at more columns in the next revolution where little is seen, and at less where much is.
