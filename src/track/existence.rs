@@ -54,11 +54,6 @@ impl Existence {
         self.odds += telling * change;
     }
 
-    /// It is nothing after all.
-    pub(super) fn deny(&mut self) {
-        self.odds = f64::NEG_INFINITY;
-    }
-
     pub(super) fn is_confirmed(&self) -> bool {
         self.sightings >= CONFIRMING
     }

@@ -46,6 +46,8 @@ pub(super) struct Look {
     /// Returns whose place was seen empty before, and something in it.
     pub(super) new: f64,
     pub(super) old: f64,
+    /// Rays pass to the left and to the right: across the line of sight it is all of it.
+    pub(super) is_apart: bool,
 }
 
 /// What begins higher has lost its wheels and bumpers to the ground, or between two layers.
@@ -123,6 +125,7 @@ impl Look {
             sensor_m,
             new: if is_upright { new } else { 0.0 },
             old: if is_upright { old } else { old + new },
+            is_apart: false,
         }
     }
 

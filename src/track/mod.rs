@@ -2,8 +2,8 @@
 //!
 //! `objects` takes a revolution in: `patches` takes its clusters, after `thinning` them, with what goes
 //! on `above` them, by `placing` them, what drives along with the sensor over the `seam` of the sweep as one, and
-//! divides them into `parts` that do not touch on the `floor`;
-//! `grouping` says which `spots` belong together, given what each track `claims` by its `forecast`
+//! divides them into `parts` that do not touch on the `floor`, and `crowds` into people, and asks what rays show
+//! at the `flanks` of each; `grouping` says which `spots` belong together, given what each track `claims` by its `forecast`
 //! and the `strays` near it, `assignment` what is whose, `sight` what is hidden and what is gone;
 //! `nearby` spares all of them what is far away. A `road_user` learns from each `look`, and the
 //! `view` of it in the road user's own axes, its `motion`, its `shape`, its `class`, of which there
@@ -24,7 +24,11 @@ mod class;
 
 mod confidence;
 
+mod crowds;
+
 mod existence;
+
+mod flanks;
 
 mod floor;
 

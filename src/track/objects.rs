@@ -190,21 +190,13 @@ impl ObjectTracker {
         let sight = |place: &Rectangle, height_m: f64| {
             Sight::at(scene.scan, &placement, sensor_height_m, place, height_m)
         };
-        for (number, (track, pair)) in self
-            .tracks
-            .iter_mut()
-            .zip(self.assigner.pairs())
-            .enumerate()
-        {
+        for (track, pair) in self.tracks.iter_mut().zip(self.assigner.pairs()) {
             match pair.map(|group| &self.grouping.groups()[group]) {
                 Some(group) => {
                     let spots = self.grouping.spots(group);
                     let floor_z_m = floor_z_m(spots, scene);
                     track.measure(spots, &group.look, end, floor_z_m, &mut self.outline);
                     track.look_back(sight);
-                    if self.grouping.holds_things_apart(number) {
-                        track.give_way();
-                    }
                 }
                 None if track.rests() => {}
                 None => {
@@ -590,32 +582,6 @@ mod tests {
         assert_eq!(claimed(false, half), (true, vec![Some(0)]));
         // Who stands before it keeps what is theirs.
         assert_eq!(claimed(true, end), (false, vec![Some(0), Some(1)]));
-    }
-
-    #[test]
-    fn what_was_taken_for_one_gives_way_to_two_cars_side_by_side() {
-        // Two fronts 1.8 m wide and 8 m away, 1 m from each other, and 2.7 m of a side of each.
-        let cars = |is_between_seen: bool| {
-            scan_of(1800, |column, layer| match column {
-                _ if !(3..7).contains(&layer) => 0,
-                88..100 => 800 + 23 * (100 - column as u16),
-                164..200 if !is_between_seen => 0,
-                100..264 => 800,
-                264..276 => 800 + 23 * (column as u16 - 263),
-                _ => 0,
-            })
-        };
-        let mut tracker = ObjectTracker::default();
-        let mut ids = vec![];
-        for revolution in 0..20 {
-            let scan = cars(revolution < 10);
-            see(&mut tracker, &later(&scan, 0.1 * f64::from(revolution)));
-            ids.push(tracker.tracks.iter().map(|track| track.id).collect());
-        }
-        let [of_one, .., of_both]: &[Vec<u32>] = &ids[..] else {
-            panic!("{ids:?}");
-        };
-        assert_eq!((&of_one[..], &of_both[..]), (&[0][..], &[2, 3][..]));
     }
 
     /// A track that was seen once.

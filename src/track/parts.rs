@@ -44,10 +44,17 @@ struct Step {
 
 /// Returns that follow each other in one part.
 #[derive(Debug, Clone, Copy, Default)]
-struct Piece {
+pub(super) struct Piece {
     part: u32,
     begin: u32,
     end: u32,
+}
+
+impl Piece {
+    /// Where they stand among those of the cluster.
+    pub(super) fn stretch(&self) -> Range<usize> {
+        self.begin as usize..self.end as usize
+    }
 }
 
 /// Cells that touch.
@@ -83,13 +90,32 @@ impl Part {
     }
 }
 
+/// How large the cells are of which a part consists.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cells {
+    /// Their side near the sensor.
+    pub(super) near_m: f32,
+    /// What is added to it for each metre of range beyond that.
+    pub(super) per_m: f32,
+}
+
+impl Cells {
+    /// Those of bodies: surfaces of one are closer to each other, seen from above, and people are
+    /// farther from the hedge that they pass.
+    pub(super) const OF_BODIES: Self = Self {
+        near_m: 0.3,
+        per_m: 0.012,
+    };
+
+    /// Their side, of a cluster so far away.
+    fn side_m(&self, range_m: f32) -> f32 {
+        self.near_m + self.per_m * greatest(range_m - NEAR_M, 0.0)
+    }
+}
+
 /// The part of what belongs to none.
 const NO_PART: u32 = 0;
-/// Side of the cells of which a part consists: surfaces of one body are closer to each other,
-/// seen from above, and people are farther from the hedge that they pass.
-const CELL_M: f32 = 0.3;
-/// What is added to it for each metre of range beyond the first.
-const CELL_PER_M: f32 = 0.012;
+/// Nearer, rays are closer together than cells.
 const NEAR_M: f32 = 12.0;
 /// What is higher is cut off what may stand below it: crowns of trees, roofs.
 pub(super) const CUT_M: f32 = 2.1;
@@ -120,17 +146,18 @@ fn is_upper(level: u32) -> bool {
 }
 
 impl Parts {
-    /// Divides a cluster in the box `whole`, placed relative to `origin_m`. What is above the cut
-    /// belongs to a part that goes on there, unless all of it is too tall.
+    /// Divides a cluster in the box `whole`, placed relative to `origin_m`, by cells. What is above
+    /// the cut belongs to a part that goes on there, unless all of it is too tall.
     pub(super) fn divide(
         &mut self,
         cluster: &Placing,
         whole: &Bounds,
+        cells: Cells,
         is_too_tall: bool,
         origin_m: [f64; 2],
     ) {
         let [nearest_m, _] = bounds_of(cluster.range_m());
-        let cell_m = CELL_M + CELL_PER_M * greatest(nearest_m - NEAR_M, 0.0);
+        let cell_m = cells.side_m(nearest_m);
         self.floor
             .begin(whole.low_m, whole.high_m, cell_m, origin_m);
         self.floor.find_places(cluster.at_m(), &mut self.keys);
@@ -249,15 +276,20 @@ impl Parts {
         placed: &mut Vec<Placed>,
         mut has_put: impl FnMut(Range<usize>, Bounds, bool),
     ) {
-        for pieces in self.sorted.chunk_by(|a, b| a.part == b.part) {
+        for pieces in self.pieces() {
             let (begin, mut bounds) = (placed.len(), Bounds::NOTHING);
             for piece in pieces {
-                let own = cluster.stretch(piece.begin as usize..piece.end as usize);
+                let own = cluster.stretch(piece.stretch());
                 placed.extend(own.inspect(|own| bounds.extend(own)));
             }
             let part = &self.parts[pieces[0].part as usize];
             has_put(begin..placed.len(), bounds, part.goes_on());
         }
+    }
+
+    /// The pieces of every part, part by part.
+    pub(super) fn pieces(&self) -> impl Iterator<Item = &[Piece]> {
+        self.sorted.chunk_by(|a, b| a.part == b.part)
     }
 }
 

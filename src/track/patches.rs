@@ -1,9 +1,11 @@
 //! Returns of one revolution that may be road users, placed, cluster by cluster and part by part.
 
 use super::above::Climber;
+use super::crowds::Crowds;
+use super::flanks::Flanks;
 use super::forecast::Forecasts;
 use super::newcomers::{self, Newcomers};
-use super::parts::{CUT_M, Parts};
+use super::parts::{CUT_M, Cells, Parts};
 use super::placing::{Bounds, Placed, Placing};
 use super::spots::seen_before;
 use super::thinning::Thinning;
@@ -27,13 +29,14 @@ pub(super) struct Patch {
     pub(super) before: Seen,
     /// How many returns each of its own stands for, on average.
     pub(super) returns_each: f32,
+    /// What rays show to its left and to its right.
+    pub(super) flanks: Flanks,
 }
 
 impl Patch {
     /// From corner to corner.
     pub(super) fn diagonal_m(&self) -> f64 {
-        let side_m = |axis: usize| f64::from(self.bounds.high_m[axis] - self.bounds.low_m[axis]);
-        (side_m(0) * side_m(0) + side_m(1) * side_m(1)).sqrt()
+        self.bounds.diagonal_m()
     }
 
     /// Whether it can be a road user as a whole.
@@ -59,9 +62,10 @@ pub(super) struct Placer {
     patches: Vec<Patch>,
     parts: Parts,
     newcomers: Newcomers,
+    crowds: Crowds,
     /// The tracks that move and may be in a patch.
     near: Vec<usize>,
-    /// The patches before newcomers were parted from them, and where one of them is cut.
+    /// The patches before they were parted once more, and where one of them is cut.
     former: Vec<Patch>,
     cuts: Vec<usize>,
 }
@@ -112,6 +116,7 @@ impl Placer {
                 is_suspect: false,
                 before: Seen::Unknown,
                 returns_each,
+                flanks: Flanks::default(),
             };
             if whole.diagonal_m() < SMALLEST_DIVIDED_M {
                 self.placed.extend(self.cluster.iter());
@@ -127,6 +132,10 @@ impl Placer {
         }
         self.look_back(forecasts, scene);
         self.part_newcomers(forecasts, scene);
+        self.part_crowds(scene, parameters);
+        for patch in &mut self.patches {
+            patch.flanks = Flanks::of(&self.placed[patch.begin..patch.end], scene.scan);
+        }
     }
 
     /// Looks up what was in the place of every return before. What moves may have been there itself.
@@ -194,6 +203,37 @@ impl Placer {
         }
     }
 
+    /// Makes a patch of everybody in a crowd.
+    fn part_crowds(&mut self, scene: &Scene<'_>, parameters: &TrackParameters) {
+        std::mem::swap(&mut self.patches, &mut self.former);
+        self.patches.clear();
+        for patch in &self.former {
+            if patch.can_be_road_user(parameters) {
+                let placed = &mut self.placed[patch.begin..patch.end];
+                let (scan, ends) = (scene.scan, &mut self.cuts);
+                self.crowds
+                    .part(placed, &patch.bounds, scan, self.origin_m, ends);
+            } else {
+                self.cuts.clear();
+            }
+            if self.cuts.is_empty() {
+                self.patches.push(*patch);
+            }
+            let mut begin = patch.begin;
+            for end in self.cuts.iter().map(|cut| patch.begin + cut) {
+                let own = &self.placed[begin..end];
+                self.patches.push(Patch {
+                    begin,
+                    end,
+                    bounds: Bounds::of(own),
+                    before: newcomers::most(own),
+                    ..*patch
+                });
+                begin = end;
+            }
+        }
+    }
+
     /// The parts of all clusters.
     pub(super) fn patches(&self) -> &[Patch] {
         &self.patches
@@ -213,7 +253,7 @@ impl Placer {
     fn divide(&mut self, whole: &Bounds, is_too_tall: bool) {
         let cluster = &self.cluster;
         self.parts
-            .divide(cluster, whole, is_too_tall, self.origin_m);
+            .divide(cluster, whole, Cells::OF_BODIES, is_too_tall, self.origin_m);
         self.parts
             .put(cluster, &mut self.placed, |own, bounds, goes_on| {
                 self.patches.push(Patch {
@@ -224,6 +264,7 @@ impl Placer {
                     is_suspect: false,
                     before: Seen::Unknown,
                     returns_each: 1.0,
+                    flanks: Flanks::default(),
                 });
             });
     }
@@ -273,6 +314,79 @@ mod tests {
             assert!(of_own.all(|column| columns.contains(&column)));
             assert!(!patch.is_suspect);
         }
+    }
+
+    /// Columns of a person who stands 8 m away, 0.45 m wide.
+    const PERSON: std::ops::Range<usize> = 100..116;
+
+    /// What is met of people in these columns, 8 m away and up to 1.7 m above the ground.
+    fn people(columns: &[std::ops::Range<usize>], column: usize, layer: usize) -> u16 {
+        let is_met = columns.iter().any(|own| own.contains(&column));
+        if is_met && (3..8).contains(&layer) {
+            800
+        } else {
+            0
+        }
+    }
+
+    #[test]
+    fn people_side_by_side_are_parted_and_each_stands_apart() {
+        // 0.3 m from each other, as far as the cells that hold a car together are wide.
+        let (placer, scan) = patches(|column, layer| people(&[PERSON, 127..143], column, layer));
+        let [left, right] = placer.patches() else {
+            panic!("{:?}", placer.patches());
+        };
+        for (patch, columns) in [(left, PERSON), (right, 127..143)] {
+            let mut own = placer.placed(patch).iter();
+            assert!(own.all(|placed| columns.contains(&scan.column(placed.point as usize))));
+            assert!(patch.flanks.stand_apart);
+        }
+        assert!(left.flanks.are_parted_from(&right.flanks, &scan));
+        assert!(right.flanks.are_parted_from(&left.flanks, &scan));
+    }
+
+    #[test]
+    fn two_pieces_of_a_side_with_such_a_gap_are_no_crowd() {
+        // 2.5 m each.
+        let (placer, _) = patches(|column, layer| match column {
+            100..190 | 201..291 if (3..8).contains(&layer) => 800,
+            _ => 0,
+        });
+        assert_eq!(placer.patches().len(), 1);
+    }
+
+    #[test]
+    fn a_post_that_hides_what_may_be_between_two_things_parts_them_not() {
+        let both = [PERSON, 130..146];
+        let with_post = |column: usize, layer: usize| match column {
+            117..129 => 400,
+            _ => people(&both, column, layer),
+        };
+        let (placer, scan) = patches(with_post);
+        let far: Vec<_> = placer
+            .patches()
+            .iter()
+            .filter(|patch| patch.bounds.high_m[1] > 6.0)
+            .collect();
+        let [left, right] = far[..] else {
+            panic!("{:?}", placer.patches());
+        };
+        assert!(!left.flanks.are_parted_from(&right.flanks, &scan));
+    }
+
+    #[test]
+    fn who_touches_a_wall_does_not_stand_apart() {
+        let (placer, _) = patches(|column, layer| people(&[PERSON], column, layer));
+        let placed = placer.placed(&placer.patches()[0]);
+        let beside = |range_cm: u16| {
+            let scan = scan_of(1800, |column, layer| match column {
+                116.. => range_cm,
+                _ => people(&[PERSON], column, layer),
+            });
+            Flanks::of(placed, &scan).stand_apart
+        };
+        // At the wall, before it, and half hidden by it.
+        assert_eq!([820, 900, 700].map(beside), [false, true, true]);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::{Scene, seam};
 use crate::beams::Seen;
-use crate::cloud::MAX_LAYERS;
+use crate::cloud::{MAX_LAYERS, Scan};
 use crate::float::{bounds_of, greatest, least};
 
 /// Returns of a cluster in the order of the scan, each with the sensor's pose at the time of its
@@ -81,6 +81,12 @@ impl Bounds {
         [0, 1].map(|axis| 0.5 * (self.low_m[axis] + self.high_m[axis]))
     }
 
+    /// From corner to corner from above.
+    pub(super) fn diagonal_m(&self) -> f64 {
+        let [x_m, y_m] = [0, 1].map(|axis| f64::from(self.high_m[axis] - self.low_m[axis]));
+        (x_m * x_m + y_m * y_m).sqrt()
+    }
+
     /// The box that holds some returns.
     pub(super) fn of(returns: &[Placed]) -> Self {
         let mut bounds = Self::NOTHING;
@@ -122,16 +128,7 @@ impl Placing {
 
     /// Places the returns of a cluster.
     pub(super) fn place(&mut self, points: &[u32], scene: &Scene<'_>) {
-        self.count = points.len();
-        let most = self.count.max(self.x_m.len());
-        for metres in [
-            &mut self.x_m,
-            &mut self.y_m,
-            &mut self.above_m,
-            &mut self.range_m,
-        ] {
-            metres.resize(most, 0.0);
-        }
+        self.make_room(points.len());
         self.point.clear();
         self.point.extend_from_slice(points);
         let scan = scene.scan;
@@ -151,6 +148,33 @@ impl Placing {
         self.brought = 0;
         if let Some(step_m) = seam::step_m(points, scene) {
             self.bring_older(step_m, scene);
+        }
+    }
+
+    /// Takes returns of a scan that were placed before, in their order.
+    pub(super) fn take(&mut self, placed: &[Placed], scan: &Scan) {
+        self.make_room(placed.len());
+        self.point.clear();
+        self.brought = 0;
+        for (place, own) in placed.iter().enumerate() {
+            [self.x_m[place], self.y_m[place]] = own.at_m;
+            self.above_m[place] = own.above_m;
+            self.range_m[place] = scan.range_m()[own.point as usize];
+            self.point.push(own.point);
+        }
+    }
+
+    /// Makes the buffers hold so many.
+    fn make_room(&mut self, count: usize) {
+        self.count = count;
+        let most = count.max(self.x_m.len());
+        for metres in [
+            &mut self.x_m,
+            &mut self.y_m,
+            &mut self.above_m,
+            &mut self.range_m,
+        ] {
+            metres.resize(most, 0.0);
         }
     }
 

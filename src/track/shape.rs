@@ -104,13 +104,14 @@ impl Shape {
         [0, 1].map(|axis| car[axis] + self.lorry * (lorry[axis] - car[axis]))
     }
 
-    /// Learns from a further look in the axes of the yaw.
-    pub(super) fn learn(&mut self, view: &View, look: &Look) {
+    /// Learns from a further look in the axes of the yaw, of what is rather a vehicle or not.
+    pub(super) fn learn(&mut self, view: &View, look: &Look, is_vehicle: bool) {
         /// Sizes grow within a few revolutions and shrink within some seconds.
         const GROW: f64 = 0.3;
         const SHRINK: f64 = 0.03;
-        /// What no vehicle can be is forgotten at once.
+        /// What no vehicle can be is forgotten at once, and what of it all is clearly not there.
         const CORRECT: f64 = 0.2;
+        const MUCH_LESS: f64 = 0.9;
         const TOP_UP: f64 = 0.4;
         const TOP_DOWN: f64 = 0.1;
         /// Wholes are believed within a few revolutions near the sensor.
@@ -134,11 +135,12 @@ impl Shape {
             let is_whole = view.is_whole()[axis];
             let is_too_wide = axis == 1 && self.seen_m[1] > self.widest_m();
             let is_thin = axis == 1 && is_whole && extent[0] > LONG_M;
-            let gain = if (is_too_wide || is_thin) && fresh_m < self.seen_m[1] {
-                CORRECT
-            } else {
-                gain
-            };
+            // People stretch their arms and turn. Vehicles stay as they are: far less than was known is not them.
+            let is_news = !is_vehicle || fresh_m < MUCH_LESS * self.seen_m[axis];
+            let is_apart = look.is_apart && view.is_side_on(axis) && is_news;
+            let is_whole = is_whole || is_apart;
+            let is_wrong = is_apart || ((is_too_wide || is_thin) && fresh_m < self.seen_m[1]);
+            let gain = if is_wrong { gain.max(CORRECT) } else { gain };
             if fresh_m > self.seen_m[axis] || is_whole || is_too_wide {
                 self.seen_m[axis] += gain * (fresh_m - self.seen_m[axis]);
             }

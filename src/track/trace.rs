@@ -21,6 +21,15 @@ impl Trace {
         self.count += 1;
     }
 
+    /// These places, and then those of the same thing later.
+    pub(super) fn followed_by(mut self, later: &Self) -> Self {
+        for number in later.count.saturating_sub(Self::LONGEST)..later.count {
+            let (time, at_m) = later.places[number % Self::LONGEST];
+            self.push(time, at_m);
+        }
+        self
+    }
+
     pub(super) fn clear(&mut self) {
         self.count = 0;
     }
@@ -59,6 +68,24 @@ impl Trace {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_goes_on_as_another_was_where_that_was() {
+        let at = |seconds: f64| Time::ZERO + Span::from_seconds(seconds);
+        let begun = |from_s: f64, count: u32| {
+            let mut trace = Trace::default();
+            for step in 0..count {
+                let seconds = from_s + 0.1 * f64::from(step);
+                trace.push(at(seconds), Vector2::new(seconds, 0.0));
+            }
+            trace
+        };
+        let trace = begun(10.0, 40).followed_by(&begun(14.2, 3));
+        for seconds in [12.0, 13.9, 14.3] {
+            let off_m = trace.at(at(seconds)).unwrap() - Vector2::new(seconds, 0.0);
+            assert!(off_m.norm() < 1e-9, "{seconds} {off_m}");
+        }
+    }
 
     #[test]
     fn a_place_is_known_between_revolutions_and_not_before_the_first_or_across_a_gap() {

@@ -26,8 +26,8 @@ pub(super) struct View {
     is_cabin: bool,
     /// Nothing hides an end of it.
     is_free: bool,
-    /// The sensor looks at a side, not at the front or the rear.
-    is_side_on: bool,
+    /// Whether the sensor looks at the side along each axis: the length, not the front or the rear, and the width.
+    is_side_on: [bool; 2],
     sine: f64,
     cosine: f64,
     /// Standard deviation of an edge.
@@ -67,7 +67,7 @@ impl View {
             is_upper: false,
             is_cabin: look.floor_m > BONNET_M,
             is_free: look.is_cut == [false; 2],
-            is_side_on: left[0].abs() > SIDE_ON,
+            is_side_on: left.map(|share| share.abs() > SIDE_ON),
             sine,
             cosine,
             edge_m: EDGE_M + EDGE_PER_M * look.range_m,
@@ -111,6 +111,11 @@ impl View {
     /// Whether an extent is the whole of its side.
     pub(super) fn is_whole(&self) -> [bool; 2] {
         self.is_whole
+    }
+
+    /// Whether the sensor looks at the side along an axis.
+    pub(super) fn is_side_on(&self, axis: usize) -> bool {
+        self.is_side_on[axis]
     }
 
     /// Where the middle of a box of this size is, given where it is expected, how sure its direction
@@ -161,7 +166,7 @@ impl View {
             let edge_m = self.edge_m + rear_m;
             // What drives out of sight is not seen up to its ends, whatever hides it.
             let is_piece =
-                axis == 0 && drives && self.is_side_on && high - low < PIECE * size_m[axis];
+                axis == 0 && drives && self.is_side_on[0] && high - low < PIECE * size_m[axis];
             let is_edge = [self.low_is_edge[axis], self.high_is_edge[axis]];
             let is_edge = is_edge.map(|is_edge| (is_edge || is_rider) && !is_piece);
             (centre[axis], deviation[axis]) = match is_edge.into() {

@@ -1,5 +1,6 @@
 //! The scenes themselves. Traffic drives on the right; x is east, y north.
 
+mod groups;
 mod overgrown;
 mod passage;
 mod places;
@@ -108,6 +109,13 @@ pub(super) const ALL: &[Scenario] = &[
         summary: "a street that chance furnishes, too, among gardens: ragged trees, thickets and fronts \
                   close behind parked vehicles and above them",
         build: overgrown::overgrown,
+        roads: None,
+    },
+    Scenario {
+        name: "groups",
+        summary: "a street with cyclists and people on foot in groups, one behind another and side by \
+                  side, whom the vehicle follows, overtakes and meets",
+        build: groups::groups,
         roads: None,
     },
 ];

@@ -161,7 +161,7 @@ pub(super) fn parked(random: &mut Random, [x, y]: [f64; 2]) -> Actor {
     actor(variant, Path::parked([x, y], turn_deg + slant_deg))
 }
 
-fn person(random: &mut Random) -> Variant {
+pub(super) fn person(random: &mut Random) -> Variant {
     let own = Variant::pedestrian(random);
     // Children, too.
     let scale = if random.uniform() < 0.15 {

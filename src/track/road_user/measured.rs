@@ -39,7 +39,8 @@ impl Track {
         }
         let view = View::of(look, spots, self.shape.yaw_rad);
         let before = self.shape.size_m(self.belief.vehicle());
-        self.shape.learn(&view, look);
+        let is_vehicle = self.is_vehicle();
+        self.shape.learn(&view, look, is_vehicle);
         let after = self.shape.size_m(self.belief.vehicle());
         self.keep_near_edges(look, before, after);
         let (centre_m, noise) = self.centre(&view, self.motion.estimate().position_m);
@@ -293,11 +294,32 @@ mod tests {
     }
 
     #[test]
-    fn only_what_is_no_road_user_gives_way_to_several_things_in_its_place() {
-        let [mut car, mut wall] = [0.0, 1.0].map(seen);
-        (car.moves, wall.moves) = (false, false);
-        car.give_way();
-        wall.give_way();
-        assert!(wall.existence.is_gone() && !car.existence.is_gone());
+    fn who_stands_apart_is_as_wide_as_seen_within_a_second_and_a_car_stays_as_it_was() {
+        // What is met between some columns 10 m away, known as half as wide again or as a little wider.
+        let wide_m = |columns: usize, factor: f64, is_apart: bool| {
+            let scan = scan_of(1800, |column, layer| match column {
+                column if column < columns && (4..8).contains(&layer) => 1000,
+                _ => 0,
+            });
+            let spots = spots_of(&scan);
+            let look = Look {
+                is_apart,
+                ..Look::at(&spots, &scan, Vector2::zeros())
+            };
+            let (mut outline, mut end) = (vec![], scan.time());
+            let mut track = Track::new(0, false, &spots, &look, end, 0.0, &mut outline);
+            let seen_m = track.shape.seen_m[0].max(track.shape.seen_m[1]);
+            track.shape.seen_m = track.shape.seen_m.map(|side_m| factor * side_m);
+            for _ in 0..10 {
+                end = end + Span::from_seconds(0.1);
+                track.measure(&spots, &look, end, 0.0, &mut outline);
+            }
+            track.shape.seen_m[0].max(track.shape.seen_m[1]) / seen_m
+        };
+        let (person, car) = (14, 120);
+        assert!(wide_m(person, 1.5, true) < 1.1);
+        assert!(wide_m(person, 1.5, false) > 1.2);
+        assert!(wide_m(car, 1.5, true) < 1.2);
+        assert!(wide_m(car, 1.07, true) > 1.03);
     }
 }

@@ -310,20 +310,10 @@ impl Track {
         self.existence.odds()
     }
 
-    /// Whether it was seen wider than a car: it may be two of them that stand side by side.
-    pub(super) fn is_wide(&self) -> bool {
-        const WIDE_M: f64 = 2.0;
-        self.shape.seen_m[1] > WIDE_M
-    }
-
-    /// There are several things in its place that do not touch: if it is no road user, each of them
-    /// may be one. Of what is wide less doubt is enough.
-    pub(super) fn give_way(&mut self) {
-        const HARDLY: f64 = 0.25;
-        let least = if self.is_wide() { HARDLY } else { SURELY_NONE };
-        if self.belief.road_user() < least && !self.moves && self.is_confirmed() {
-            self.existence.deny();
-        }
+    /// The narrower side of what was seen of it.
+    pub(super) fn narrow_m(&self) -> f64 {
+        let [length_m, width_m] = self.shape.seen_m;
+        length_m.min(width_m)
     }
 
     /// Nothing was found that is this object.

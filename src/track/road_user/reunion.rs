@@ -253,6 +253,12 @@ impl Track {
             self.parted = Parting::of(&self.motion.estimate(), self.points, self.time);
             self.moves = true;
         }
+        if lost.moves && is_same_kind && !self.moves {
+            self.moves = true;
+            (self.travelled_m, self.speed_mps) = (lost.travelled_m, lost.speed_mps);
+            self.newness = lost.newness;
+        }
+        self.trace = lost.trace.followed_by(&self.trace);
         (self.id, self.turn) = (lost.id, lost.turn);
         self.first_seen = lost.first_seen;
         if lost.belief.road_user() > self.belief.road_user() {
