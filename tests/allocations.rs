@@ -81,7 +81,7 @@ fn nor_does_one_at_a_roundabout_of_a_map() {
 
 fn allocates_nothing(scenario: &str, has_map: bool) {
     const REVOLUTIONS: usize = 30;
-    const ROUNDS: usize = 16;
+    const ROUNDS: usize = 24;
     let frames = drive(scenario, REVOLUTIONS);
     let mut configuration = Configuration::default();
     // Who drives to and fro turns all the time, and a way that has turned takes memory to look at, once in fifteen metres.

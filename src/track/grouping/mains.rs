@@ -37,10 +37,13 @@ impl Mains {
         });
     }
 
-    /// Pairs the nearest first.
+    /// Pairs the nearest first; of equally near ones the first track.
     pub(super) fn pair(&mut self) {
-        self.proposals
-            .sort_by(|one, other| one.off_m.total_cmp(&other.off_m));
+        self.proposals.sort_unstable_by(|one, other| {
+            let rank = |proposal: &Proposal| (proposal.track, proposal.patch);
+            let nearer = one.off_m.total_cmp(&other.off_m);
+            nearer.then(rank(one).cmp(&rank(other)))
+        });
         for Proposal { track, patch, .. } in &self.proposals {
             if self.patches[*track].is_none() && self.tracks[*patch].is_none() {
                 self.patches[*track] = Some(*patch);
