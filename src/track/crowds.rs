@@ -103,6 +103,6 @@ fn is_somebody(own: &[Placed]) -> bool {
 /// How wide returns are across the line of sight. They must be some, in the order of the scan.
 fn across_m(own: &[Placed], scan: &Scan) -> f64 {
     let [first, last] = [0, own.len() - 1].map(|place| own[place].point as usize);
-    let columns = scan.column(last) - scan.column(first);
+    let columns = scan.column(last).abs_diff(scan.column(first));
     columns as f64 * scan.step_rad().abs() * f64::from(scan.range_m()[first])
 }

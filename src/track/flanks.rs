@@ -137,7 +137,9 @@ impl Flanks {
 /// How many columns make a gap at a range.
 fn columns_of_gap(range_m: f32, scan: &Scan) -> usize {
     let columns = GAP_M / (f64::from(range_m) * scan.step_rad().abs()).max(1e-9);
-    (libm::ceil(columns) as usize).clamp(1, MOST_COLUMNS)
+    let columns = (libm::ceil(columns) as usize).clamp(1, MOST_COLUMNS);
+    // A damaged sweep may have hardly any.
+    columns.min(scan.columns())
 }
 
 /// What some layers of a column show beside what is between two ranges.
