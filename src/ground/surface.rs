@@ -45,8 +45,8 @@ pub(super) const STEEPEST: f32 = 0.15;
 const BEND: f32 = 0.012;
 const BEND_PER_M: f32 = 0.0035;
 const MOST_BEND: f32 = 0.05;
-/// How far a level may be off besides.
-const SLACK_M: f32 = 0.06;
+/// How far a level may be off besides: as much as a kerb is high, with a pavement behind it.
+const SLACK_M: f32 = 0.15;
 /// Levels this near to the plane are always possible, kerbs among them; farther ones as far
 /// as this many times the median of their layer, if so many sectors know it.
 const FLAT_M: f32 = 0.07;
@@ -234,6 +234,24 @@ mod tests {
                 0
             }
         })
+    }
+
+    /// What a sector's ring holds of a layer that meets the ground so far away and so high.
+    fn followed(rings: &[[f32; 2]]) -> Vec<bool> {
+        let mut all = [Ring::default(); MAX_LAYERS];
+        for (ring, [distance_m, level_m]) in all.iter_mut().zip(rings) {
+            (ring.distance_m, ring.level_m) = (*distance_m, *level_m);
+        }
+        follow(&mut all);
+        let known = all.iter().map(|ring| ring.distance_m > 0.0);
+        known.take(rings.len()).collect()
+    }
+
+    #[test]
+    fn a_pavement_behind_a_kerb_is_ground_and_a_bench_is_none() {
+        let street = |beyond_m: f32| [[4.0, 0.0], [5.0, 0.0], [6.5, 0.0], [9.0, beyond_m]];
+        assert_eq!(followed(&street(0.14)), [true; 4]);
+        assert_eq!(followed(&street(0.45)), [true, true, true, false]);
     }
 
     #[test]
