@@ -308,7 +308,7 @@ impl ObjectTracker {
             }
             number += 1;
         }
-        self.standing.give_way(&mut self.tracks);
+        self.standing.give_way(&mut self.tracks, least);
         for track in &mut self.tracks {
             let may_be = track.was_likely && !track.is_left_standing();
             if may_be && track.most_confidence() >= least {

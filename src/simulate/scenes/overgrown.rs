@@ -89,7 +89,7 @@ fn garden(
     [from_m, to_m]: [f64; 2],
 ) {
     let (length_m, middle_m) = (to_m - from_m, 0.5 * (from_m + to_m));
-    match pick(random, &[0.3, 0.2, 0.1, 0.1, 0.15]) {
+    match pick(random, &[0.3, 0.2, 0.15, 0.1, 0.15, 0.05]) {
         Some(0) => thicket(random, scenery, side, front_m, [from_m, to_m]),
         Some(1) => {
             // A hedge, cut once and grown since.
@@ -108,7 +108,7 @@ fn garden(
             }
         }
         Some(2) => {
-            let high_m = between(random, 0.5, 2.2);
+            let high_m = between(random, 0.5, 3.0);
             scenery.wall([side * front_m, middle_m], 90.0, length_m, high_m);
         }
         Some(3) => {
@@ -116,6 +116,13 @@ fn garden(
             scenery.fence([side * front_m, middle_m], 90.0, length_m, high_m, open);
         }
         Some(4) => front(random, scenery, side, front_m, [from_m, to_m]),
+        Some(5) => {
+            // A shed, a transformer house, a container: no larger than a van.
+            let (long_m, deep_m) = (between(random, 1.0, 6.0), between(random, 0.8, 3.0));
+            let high_m = between(random, 1.2, 3.2);
+            let across_m = side * (front_m + 0.5 * deep_m);
+            scenery.house([across_m, middle_m], 90.0, [long_m, deep_m], high_m);
+        }
         _ => {}
     }
     // Before it or around it.

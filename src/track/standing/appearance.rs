@@ -1,4 +1,4 @@
-//! What a cluster looks like in one revolution, in a dozen numbers that tell vehicles from the rest.
+//! What a cluster looks like in one revolution: a dozen numbers and a relief of it, which tell vehicles from the rest.
 
 use super::weights::{BIAS, HIDDEN};
 use crate::cloud::MAX_LAYERS;
@@ -6,8 +6,13 @@ use crate::geometry::{Rectangle, turned};
 use crate::track::Scene;
 use crate::track::look::{jump_m, median_jump_m, passed_m};
 
-/// How many numbers tell what a cluster looks like.
-pub const FEATURES: usize = 12;
+/// How many numbers tell what a cluster looks like: sizes, heights and what is around it, and then its relief.
+pub const FEATURES: usize = QUALITIES + CELLS[0] * CELLS[1];
+const QUALITIES: usize = 12;
+/// Cells of the relief, across the line of sight and along it, and their sides. Coarser ones of a metre find 6 of 100
+/// vehicles less in `astyx_dev` at one false in two revolutions.
+const CELLS: [usize; 2] = [16, 12];
+const CELL_M: f64 = 0.5;
 
 /// What one cluster looks like.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,23 +74,26 @@ impl Eye {
             }
         }
         let top_m = f64::from(scene.heights_m[top as usize]);
-        Some(Appearance {
-            features: [
-                libm::log(range_m + 1.0),
-                libm::log(rectangle.length_m + 0.1),
-                libm::log(rectangle.width_m + 0.1),
-                top_m,
-                passed_m(scan, top as usize, top_m, range_m).min(HIGHEST_M),
-                f64::from(floor_m),
-                libm::log(f64::from(columns)),
-                above_m.min(HIGHEST_M),
-                libm::log(median_jump_m(&mut self.jumps_m) + 0.01),
-                libm::log(median(&mut self.depths_m) + 0.02),
-                libm::log(mean_off_edge_m(&self.places_m, &rectangle) + 0.02),
-                median(&mut self.beyond_m).clamp(BEYOND_M[0], BEYOND_M[1]),
-            ],
-            middle_m: sum_m.map(|sum_m| sum_m / count),
-        })
+        let middle_m = sum_m.map(|sum_m| sum_m / count);
+        let mut features = [0.0; FEATURES];
+        let (qualities, relief) = features.split_at_mut(QUALITIES);
+        qualities.copy_from_slice(&[
+            libm::log(range_m + 1.0),
+            libm::log(rectangle.length_m + 0.1),
+            libm::log(rectangle.width_m + 0.1),
+            top_m,
+            passed_m(scan, top as usize, top_m, range_m).min(HIGHEST_M),
+            f64::from(floor_m),
+            libm::log(f64::from(columns)),
+            above_m.min(HIGHEST_M),
+            libm::log(median_jump_m(&mut self.jumps_m) + 0.01),
+            libm::log(median(&mut self.depths_m) + 0.02),
+            libm::log(mean_off_edge_m(&self.places_m, &rectangle) + 0.02),
+            median(&mut self.beyond_m).clamp(BEYOND_M[0], BEYOND_M[1]),
+        ]);
+        let heights_m = points.iter().map(|point| scene.heights_m[*point as usize]);
+        rise(relief, &self.places_m, heights_m, middle_m);
+        Some(Appearance { features, middle_m })
     }
 
     /// Goes through a cluster column by column: how deep each is, and how far behind its top the next
@@ -139,6 +147,30 @@ impl Appearance {
             let inner: f64 = products.map(|(weight, feature)| weight * feature).sum();
             sum + share * libm::tanh(inner + bias)
         })
+    }
+}
+
+/// Puts a cluster's relief into cells: the greatest height above the ground in each, 0 where there is nothing. They lie
+/// row by row, from the nearest place on along the line of sight, each row from left to right of the cluster's middle.
+fn rise(
+    relief: &mut [f64],
+    places_m: &[[f64; 2]],
+    heights_m: impl Iterator<Item = f32>,
+    middle_m: [f64; 2],
+) {
+    let [across, along] = CELLS;
+    let range_m = libm::hypot(middle_m[0], middle_m[1]).max(CELL_M);
+    let [x, y] = middle_m.map(|middle_m| middle_m / range_m);
+    let along_m = |place_m: &[f64; 2]| place_m[0] * x + place_m[1] * y;
+    let nearest_m = places_m.iter().map(along_m).fold(f64::INFINITY, f64::min);
+    for (place_m, height_m) in places_m.iter().zip(heights_m) {
+        let right_m = place_m[0] * y - place_m[1] * x;
+        let column = libm::floor(right_m / CELL_M) + (across / 2) as f64;
+        let row = (along_m(place_m) - nearest_m) / CELL_M;
+        if (0.0..across as f64).contains(&column) && row < along as f64 {
+            let cell = &mut relief[row as usize * across + column as usize];
+            *cell = cell.max(f64::from(height_m));
+        }
     }
 }
 
@@ -235,7 +267,7 @@ pub(super) mod tests {
     #[test]
     fn sizes_heights_and_what_the_rays_above_meet_are_told() {
         let car = look(&scan_of_blocks(&CAR));
-        let [
+        let &[
             range,
             long,
             short,
@@ -248,7 +280,7 @@ pub(super) mod tests {
             _,
             _,
             beyond_m,
-        ] = car.features;
+        ] = car.features.first_chunk().expect("they come first");
         let about = |value: f64, expected: f64| (value - expected).abs() < 0.2;
         assert!(about(range.exp() - 1.0, 7.5), "{car:?}");
         assert!(
@@ -287,7 +319,7 @@ pub(super) mod tests {
     fn a_car_looks_like_a_vehicle_and_a_wall_a_post_and_a_person_do_not() {
         let odds = |blocks: &[Block]| look(&scan_of_blocks(blocks)).vehicle_log_odds();
         assert!(odds(&CAR) > 0.5, "{}", odds(&CAR));
-        for (sides_m, high_m) in [([0.3, 12.0], 2.4), ([0.3, 0.3], 2.4), ([0.6, 0.4], 1.8)] {
+        for (sides_m, high_m) in [([0.3, 20.0], 2.4), ([0.3, 0.3], 2.4), ([0.6, 0.4], 1.8)] {
             let other = Block {
                 sides_m,
                 heights_m: [0.1, high_m],
@@ -295,6 +327,33 @@ pub(super) mod tests {
             };
             assert!(odds(&[other]) < -1.0, "{sides_m:?} {}", odds(&[other]));
         }
+    }
+
+    #[test]
+    fn the_relief_of_a_car_is_as_high_as_it_and_of_one_on_the_left_that_of_one_on_the_right_in_a_mirror()
+     {
+        let on_the_left = CAR.map(|block| Block {
+            middle_m: [-block.middle_m[0], block.middle_m[1]],
+            ..block
+        });
+        let [left, right] = [on_the_left, CAR].map(|blocks| {
+            let features = look(&scan_of_blocks(&blocks)).features;
+            features[QUALITIES..].to_vec()
+        });
+        let mirrored = right.chunks(CELLS[0]).flat_map(|row| row.iter().rev());
+        let off_m = left.iter().zip(mirrored).map(|(a, b)| (a - b).abs());
+        assert!(
+            off_m.clone().fold(0.0, f64::max) < 0.1,
+            "{left:?} {right:?}"
+        );
+        let highest_m = right.iter().copied().fold(0.0, f64::max);
+        assert!((1.2..1.5).contains(&highest_m), "{highest_m}");
+        // The nearest corner is in the first row, and the side goes on behind it.
+        assert!((0..6).all(|row| {
+            right[row * CELLS[0]..][..CELLS[0]]
+                .iter()
+                .any(|cell_m| *cell_m > 0.0)
+        }));
     }
 
     #[test]

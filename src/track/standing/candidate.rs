@@ -31,6 +31,8 @@ pub(super) struct Candidate {
     looks: u32,
     /// Whether rays passed through its place when it was looked at last.
     is_empty: bool,
+    /// Where the middle of the last look was.
+    pub(super) seen_m: Vector2<f64>,
     /// When and where the middle of the first look was, and how fast it went since.
     begun: Time,
     begun_m: Vector2<f64>,
@@ -43,9 +45,9 @@ pub(super) const LEAST_LOG: f64 = -1.5;
 const REACH: f64 = 3.0;
 /// What is added to the mean for the first look and, times its logarithm, for their number: things that
 /// only look like a vehicle for a moment are more than vehicles. Fitted once by logistic regression on
-/// simulated candidates (1.0 for the mean beside them); `scripts/evaluate` prints how right it is.
-const FIRST_LOG: f64 = -1.5;
-const MORE_LOG: f64 = 0.4;
+/// the candidates of twelve `overgrown` worlds (0.96 for the mean beside them); `scripts/evaluate` prints how right it is.
+const FIRST_LOG: f64 = -1.6;
+const MORE_LOG: f64 = 0.55;
 /// More looks say nothing new.
 const MOST_LOOKS: u32 = 20;
 /// What went on faster since its first look drives; of what stands another part is seen at every look, but it gets
@@ -72,6 +74,7 @@ impl Candidate {
             log_odds: sighting.log_odds,
             looks: 1,
             is_empty: false,
+            seen_m: sighting.look.middle_m,
             begun: sighting.look.seen_at(end),
             begun_m: sighting.look.middle_m,
             speed_mps: 0.0,
@@ -93,6 +96,7 @@ impl Candidate {
         let gain = 1.0 / f64::from(self.looks).min(REACH);
         self.log_odds += gain * (sighting.log_odds - self.log_odds);
         self.is_empty = false;
+        self.seen_m = sighting.look.middle_m;
         let seconds = (sighting.look.seen_at(end) - self.begun).seconds();
         self.speed_mps = (sighting.look.middle_m - self.begun_m).norm() / seconds;
         self.track
@@ -111,7 +115,9 @@ impl Candidate {
     ) {
         self.track.reframe(turn_rad, moved, rise_m);
         self.sides.reframe(turn_rad, moved);
-        self.begun_m = Vector2::from(moved(self.begun_m.into()));
+        for known_m in [&mut self.seen_m, &mut self.begun_m] {
+            *known_m = Vector2::from(moved((*known_m).into()));
+        }
     }
 
     /// Nothing was found in its place.

@@ -61,7 +61,7 @@ struct Lost {
     time: Time,
 }
 
-/// A candidate, a sighting in its place, and how far their middles are apart.
+/// A candidate, a sighting in its place, and how far that is from where it was seen last.
 #[derive(Debug, Clone, Copy)]
 struct Pair {
     apart_m: f64,
@@ -174,14 +174,15 @@ impl Standing {
         }
     }
 
-    /// Finds the sightings in the places of candidates, the nearest first.
+    /// Finds the sightings in the places of candidates, those first that are where it was seen last: of what stands the
+    /// same part is seen again, while its box may lie askew and reach over others.
     fn pair(&mut self) {
         self.pairs.clear();
         for (sighting, seen) in self.sightings.iter().enumerate() {
             let middle_m = seen.look.middle_m;
-            for (candidate, (place, outline)) in self.places.near(middle_m) {
+            for (candidate, (_, outline)) in self.places.near(middle_m) {
                 if outline.distance_m(middle_m.into()) < BESIDE_M {
-                    let apart_m = (middle_m - Vector2::from(place.centre_m)).norm();
+                    let apart_m = (middle_m - self.candidates[candidate].seen_m).norm();
                     self.pairs.push(Pair {
                         apart_m,
                         candidate,
@@ -223,7 +224,7 @@ impl Standing {
         }
     }
 
-    /// New candidates from what lies in the place of none.
+    /// New candidates from what lies in the place of none, or looks better than the one whose place it is.
     fn begin(&mut self, scene: &Scene<'_>, end: Time, parameters: &TrackParameters) {
         for (sighting, is_taken) in self.sightings.iter().zip(&self.is_taken) {
             if self.candidates.len() >= MOST_CANDIDATES {
@@ -231,8 +232,7 @@ impl Standing {
             }
             let middle_m = sighting.look.middle_m.into();
             let is_within = |candidate: &Candidate| candidate.place().outline().contains(middle_m);
-            let may_be = !is_taken && may_begin(sighting, parameters);
-            if !may_be || self.candidates.iter().any(is_within) {
+            if *is_taken || !may_begin(sighting, parameters) {
                 continue;
             }
             let spots = &self.spots[sighting.spots.clone()];
@@ -240,7 +240,10 @@ impl Standing {
             let outline = &mut self.outline;
             let track = Track::new(0, false, spots, &sighting.look, end, floor_z_m, outline);
             let candidate = Candidate::new(track, sighting, spots, end, outline);
-            self.candidates.push(candidate);
+            let mut there = self.candidates.iter().filter(|known| is_within(known));
+            if there.all(|known| candidate.is_better_than(known)) {
+                self.candidates.push(candidate);
+            }
         }
     }
 
@@ -270,10 +273,15 @@ impl Standing {
             .retain(|lost| (end - lost.time).seconds() < MEMORY_S);
     }
 
-    /// Gives what moves now the place of what stood there, with its identity if it has none that
-    /// others know.
-    pub(super) fn give_way(&mut self, tracks: &mut [Track]) {
-        for track in tracks.iter_mut().filter(|track| track.goes_beyond_doubt()) {
+    /// Gives what moves now and is as likely as that the place of what stood there, with its identity if it has none
+    /// that others know. What moves and is hardly a road user hides none: a piece of a hedge behind a parked car.
+    pub(super) fn give_way(&mut self, tracks: &mut [Track], least_confidence: f64) {
+        let moves = |track: &&mut Track| {
+            track.goes_beyond_doubt()
+                && track.was_likely
+                && track.most_confidence() >= least_confidence
+        };
+        for track in tracks.iter_mut().filter(moves) {
             let place = track.rectangle();
             let gone = self
                 .candidates
@@ -389,8 +397,8 @@ mod tests {
                 let clusters = dbscan.process(&scan, &vec![false; scan.len()], scene.heights_m);
                 self.standing.process(clusters, scene, &self.parameters);
             });
-            self.standing.give_way(tracks);
             let least = self.parameters.least_confidence;
+            self.standing.give_way(tracks, least);
             let next_id = &mut self.next_id;
             self.standing
                 .list(scan.time(), least, tracks, next_id, &mut objects);
@@ -398,10 +406,12 @@ mod tests {
         }
     }
 
-    /// A track of what is seen there, as if it had moved.
-    fn mover(scan: &Scan) -> Track {
-        let (mut track, _) = crate::track::tests::followed([scan]);
+    /// A track of what is seen there, as if it had moved and were a vehicle so probably.
+    fn mover(scan: &Scan, probability: f64) -> Track {
+        let (mut track, _) = crate::track::tests::followed([scan; 6]);
+        track.stand_as_vehicle(probability);
         track.moves_for_tests();
+        track.was_likely = true;
         track
     }
 
@@ -423,10 +433,24 @@ mod tests {
     }
 
     #[test]
+    fn what_lies_in_the_middle_of_a_box_does_not_take_the_place_of_what_was_seen_there() {
+        let mut street = Street::new();
+        let car = scan_of_blocks(&CAR);
+        (0..2).for_each(|_| drop(street.see(&car, &mut [], &[])));
+        let standing = &mut street.standing;
+        let mut piece = standing.sightings[0].clone();
+        piece.look.middle_m = standing.candidates[0].place().centre_m.into();
+        standing.sightings.insert(0, piece);
+        standing.pair();
+        let first = standing.pairs.first().map(|pair| pair.sighting);
+        assert_eq!((standing.pairs.len(), first), (2, Some(1)));
+    }
+
+    #[test]
     fn walls_are_not_listed() {
         let mut street = Street::new();
         let wall = scan_of_blocks(&[Block {
-            sides_m: [0.3, 12.0],
+            sides_m: [0.3, 20.0],
             heights_m: [0.1, 2.4],
             ..CAR[0]
         }]);
@@ -452,11 +476,20 @@ mod tests {
         let mut street = Street::new();
         let car = scan_of_blocks(&CAR);
         (0..4).for_each(|_| drop(street.see(&car, &mut [], &[])));
-        let mut tracks = [mover(&car)];
+        let mut tracks = [mover(&car, 1.0)];
         assert!(street.see(&car, &mut tracks, &[]).is_empty());
         assert_eq!((tracks[0].id, tracks[0].is_listed), (7, true));
         let empty = scan_of_blocks(&[]);
         assert!(street.see(&empty, &mut tracks, &[]).is_empty());
+    }
+
+    #[test]
+    fn what_moves_and_is_hardly_a_road_user_hides_no_car() {
+        let mut street = Street::new();
+        let car = scan_of_blocks(&CAR);
+        (0..4).for_each(|_| drop(street.see(&car, &mut [], &[])));
+        let mut tracks = [mover(&car, 0.1)];
+        assert_eq!(street.see(&car, &mut tracks, &[]).len(), 1);
     }
 
     #[test]
