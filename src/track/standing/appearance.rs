@@ -142,10 +142,17 @@ impl Appearance {
     /// Logarithm of the odds that this is a vehicle, had as many been vehicles as where the network
     /// was fitted.
     pub(super) fn vehicle_log_odds(&self) -> f64 {
-        HIDDEN.iter().fold(BIAS, |sum, (weights, bias, share)| {
-            let products = weights.iter().zip(self.features);
-            let inner: f64 = products.map(|(weight, feature)| weight * feature).sum();
-            sum + share * libm::tanh(inner + bias)
+        let mut inner: [f64; HIDDEN.len()] = std::array::from_fn(|unit| HIDDEN[unit].1);
+        // Most cells of a relief are empty.
+        let known = self.features.iter().enumerate();
+        for (number, feature) in known.filter(|(_, feature)| **feature != 0.0) {
+            for (sum, (weights, ..)) in inner.iter_mut().zip(&HIDDEN) {
+                *sum += weights[number] * feature;
+            }
+        }
+        let units = HIDDEN.iter().zip(inner);
+        units.fold(BIAS, |sum, ((_, _, share), inner)| {
+            sum + share * libm::tanh(inner)
         })
     }
 }

@@ -4,7 +4,7 @@
 use super::appearance::FEATURES;
 
 /// Of each hidden unit the weights of the features, its bias, and its own weight.
-pub(super) const HIDDEN: [([f64; FEATURES], f64, f64); 16] = [
+pub(super) static HIDDEN: [([f64; FEATURES], f64, f64); 16] = [
     (
         [
             -0.6972, -0.1044, -0.2365, 0.0252, -0.1435, -0.9042, 0.1387, -0.0493, 0.2531, -0.1493,
