@@ -310,8 +310,7 @@ impl ObjectTracker {
         }
         self.standing.give_way(&mut self.tracks, least);
         for track in &mut self.tracks {
-            let may_be = track.was_likely && !track.is_left_standing();
-            if may_be && track.most_confidence() >= least {
+            if track.may_be_listed(least) && !track.is_left_standing() {
                 let object = track.object(end);
                 if object.existence >= least {
                     track.is_listed = true;

@@ -34,6 +34,11 @@ impl Track {
         self.road_user_existence(1.0)
     }
 
+    /// Whether it may be as likely as that, and was once.
+    pub(in crate::track) fn may_be_listed(&self, least_confidence: f64) -> bool {
+        self.was_likely && self.most_confidence() >= least_confidence
+    }
+
     /// What is published, valid at `end`.
     pub(in crate::track) fn object(&self, end: Time) -> Object {
         let (motion, shape) = self.later(end);

@@ -1,4 +1,4 @@
-//! What a cluster looks like in one revolution: a dozen numbers and a relief of it, which tell vehicles from the rest.
+//! What a cluster looks like in one revolution: a dozen numbers and a height map of it, which tell vehicles from the rest.
 
 use super::weights::{BIAS, HIDDEN};
 use crate::cloud::MAX_LAYERS;
@@ -6,10 +6,10 @@ use crate::geometry::{Rectangle, turned};
 use crate::track::Scene;
 use crate::track::look::{jump_m, median_jump_m, passed_m};
 
-/// How many numbers tell what a cluster looks like: sizes, heights and what is around it, and then its relief.
+/// How many numbers tell what a cluster looks like: sizes, heights and what is around it, and then its height map.
 pub const FEATURES: usize = QUALITIES + CELLS[0] * CELLS[1];
 const QUALITIES: usize = 12;
-/// Cells of the relief, across the line of sight and along it, and their sides. Coarser ones of a metre find 7 of 100
+/// Cells of the height map, across the line of sight and along it, and their sides. Coarser ones of a metre find 7 of 100
 /// vehicles less in `astyx_dev` at one false in two revolutions.
 const CELLS: [usize; 2] = [16, 12];
 const CELL_M: f64 = 0.5;
@@ -76,7 +76,7 @@ impl Eye {
         let top_m = f64::from(scene.heights_m[top as usize]);
         let middle_m = sum_m.map(|sum_m| sum_m / count);
         let mut features = [0.0; FEATURES];
-        let (qualities, relief) = features.split_at_mut(QUALITIES);
+        let (qualities, height_map) = features.split_at_mut(QUALITIES);
         qualities.copy_from_slice(&[
             libm::log(range_m + 1.0),
             libm::log(rectangle.length_m + 0.1),
@@ -92,7 +92,7 @@ impl Eye {
             median(&mut self.beyond_m).clamp(BEYOND_M[0], BEYOND_M[1]),
         ]);
         let heights_m = points.iter().map(|point| scene.heights_m[*point as usize]);
-        rise(relief, &self.places_m, heights_m, middle_m);
+        map_heights(height_map, &self.places_m, heights_m, middle_m);
         Some(Appearance { features, middle_m })
     }
 
@@ -143,7 +143,7 @@ impl Appearance {
     /// was fitted.
     pub(super) fn vehicle_log_odds(&self) -> f64 {
         let mut inner: [f64; HIDDEN.len()] = std::array::from_fn(|unit| HIDDEN[unit].1);
-        // Most cells of a relief are empty.
+        // Most cells of a height map are empty.
         let known = self.features.iter().enumerate();
         for (number, feature) in known.filter(|(_, feature)| **feature != 0.0) {
             for (sum, (weights, ..)) in inner.iter_mut().zip(&HIDDEN) {
@@ -157,25 +157,26 @@ impl Appearance {
     }
 }
 
-/// Puts a cluster's relief into cells: the greatest height above the ground in each, 0 where there is nothing. They lie
+/// Maps a cluster's heights: the greatest height above the ground in each, 0 where there is nothing. They lie
 /// row by row, from the nearest place on along the line of sight, each row from left to right of the cluster's middle.
-fn rise(
-    relief: &mut [f64],
+fn map_heights(
+    height_map: &mut [f64],
     places_m: &[[f64; 2]],
     heights_m: impl Iterator<Item = f32>,
     middle_m: [f64; 2],
 ) {
     let [across, along] = CELLS;
     let range_m = libm::hypot(middle_m[0], middle_m[1]).max(CELL_M);
-    let [x, y] = middle_m.map(|middle_m| middle_m / range_m);
-    let along_m = |place_m: &[f64; 2]| place_m[0] * x + place_m[1] * y;
-    let nearest_m = places_m.iter().map(along_m).fold(f64::INFINITY, f64::min);
+    let [cosine, sine] = middle_m.map(|middle_m| middle_m / range_m);
+    let in_sight_m = |place_m: &[f64; 2]| turned(place_m, sine, cosine);
+    let along_m = places_m.iter().map(|place_m| in_sight_m(place_m)[0]);
+    let nearest_m = along_m.fold(f64::INFINITY, f64::min);
     for (place_m, height_m) in places_m.iter().zip(heights_m) {
-        let right_m = place_m[0] * y - place_m[1] * x;
-        let column = libm::floor(right_m / CELL_M) + (across / 2) as f64;
-        let row = (along_m(place_m) - nearest_m) / CELL_M;
+        let [along_m, left_m] = in_sight_m(place_m);
+        let column = libm::floor(-left_m / CELL_M) + (across / 2) as f64;
+        let row = (along_m - nearest_m) / CELL_M;
         if (0.0..across as f64).contains(&column) && row < along as f64 {
-            let cell = &mut relief[row as usize * across + column as usize];
+            let cell = &mut height_map[row as usize * across + column as usize];
             *cell = cell.max(f64::from(height_m));
         }
     }
@@ -337,7 +338,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn the_relief_of_a_car_is_as_high_as_it_and_of_one_on_the_left_that_of_one_on_the_right_in_a_mirror()
+    fn the_height_map_of_a_car_is_as_high_as_it_and_of_one_on_the_left_that_of_one_on_the_right_in_a_mirror()
      {
         let on_the_left = CAR.map(|block| Block {
             middle_m: [-block.middle_m[0], block.middle_m[1]],

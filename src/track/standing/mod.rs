@@ -276,11 +276,8 @@ impl Standing {
     /// Gives what moves now and is as likely as that the place of what stood there, with its identity if it has none
     /// that others know. What moves and is hardly a road user hides none: a piece of a hedge behind a parked car.
     pub(super) fn give_way(&mut self, tracks: &mut [Track], least_confidence: f64) {
-        let moves = |track: &&mut Track| {
-            track.goes_beyond_doubt()
-                && track.was_likely
-                && track.most_confidence() >= least_confidence
-        };
+        let moves =
+            |track: &&mut Track| track.goes_beyond_doubt() && track.may_be_listed(least_confidence);
         for track in tracks.iter_mut().filter(moves) {
             let place = track.rectangle();
             let gone = self
@@ -444,6 +441,34 @@ mod tests {
         standing.pair();
         let first = standing.pairs.first().map(|pair| pair.sighting);
         assert_eq!((standing.pairs.len(), first), (2, Some(1)));
+    }
+
+    #[test]
+    fn a_better_look_begins_a_candidate_in_the_place_of_a_worse_one() {
+        let car = scan_of_blocks(&CAR);
+        let begun = |more_log: f64| {
+            let mut street = Street::new();
+            (0..2).for_each(|_| drop(street.see(&car, &mut [], &[])));
+            let Street {
+                standing,
+                parameters,
+                ..
+            } = &mut street;
+            standing.sightings[0].log_odds += more_log;
+            standing.is_taken[0] = false;
+            with_scene(&car, |scene| standing.begin(scene, car.time(), parameters));
+            standing.candidates.len()
+        };
+        assert_eq!([0.0, -1.0].map(begun), [1, 1]);
+        let mut poor = Street::new();
+        poor.see(&car, &mut [], &[]);
+        let standing = &mut poor.standing;
+        standing.sightings[0].log_odds += 3.0;
+        standing.is_taken = vec![false];
+        with_scene(&car, |scene| {
+            standing.begin(scene, car.time(), &poor.parameters)
+        });
+        assert_eq!(standing.candidates.len(), 2);
     }
 
     #[test]
