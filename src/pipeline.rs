@@ -126,6 +126,9 @@ impl Pipeline {
             placements: &self.placements,
             beams: &self.beams,
         };
+        if let Some(extent) = self.own_vehicle.extent() {
+            self.tracker.forget_pieces(&extent, &self.scan, &sweep);
+        }
         let objects = self.tracker.process(clusters, &scene);
         self.objects.clear();
         let in_local_frame = |object: &Object| object.in_local_frame(&sweep.anchor);

@@ -86,7 +86,7 @@ pub use class::Class;
 pub use standing::FEATURES as APPEARANCE_FEATURES;
 
 use crate::beams::Beams;
-use crate::cloud::Scan;
+use crate::cloud::{Extent, Scan};
 use crate::cluster::Clusters;
 use crate::ego::{Anchor, Placement, Pose, Sweep};
 use crate::geometry::Rectangle;
@@ -293,6 +293,13 @@ impl Tracker {
                 .expect(end, &sweep.sensor, is_meant, &mut self.expected);
         }
         &self.expected
+    }
+
+    /// Forgets who was not seen for two revolutions where the own vehicle turned out to be, in the sensor frame of a sweep.
+    pub fn forget_pieces(&mut self, own_vehicle: &Extent, scan: &Scan, sweep: &Sweep) {
+        let since = scan.time() + Span::from_seconds(-2.5 * scan.duration_s());
+        self.by_object
+            .forget_pieces(own_vehicle, &sweep.sensor, since);
     }
 
     /// What each cluster of the last revolution looks like: [`APPEARANCE_FEATURES`] numbers a cluster, all

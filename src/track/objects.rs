@@ -13,6 +13,7 @@ use super::sight::Sight;
 use super::spots::Spot;
 use super::standing::{FEATURES, Standing};
 use super::{Object, Scene, TrackParameters};
+use crate::cloud::Extent;
 use crate::cluster::Clusters;
 use crate::ego::{Pose, wrapped_rad};
 use crate::geometry::Rectangle;
@@ -63,6 +64,19 @@ impl ObjectTracker {
 
     pub(super) fn objects(&self) -> &[Object] {
         &self.objects
+    }
+
+    /// Forgets who was not seen since a time where the own vehicle turned out to be: it was a piece of that.
+    pub(super) fn forget_pieces(&mut self, own_vehicle: &Extent, sensor: &Pose, since: Time) {
+        let placement = sensor.placement();
+        let is_within = |track: &Track| {
+            let place_m = placement.sensor_m(track.position_m().into());
+            let sides_m = own_vehicle.low_m.iter().zip(&own_vehicle.high_m);
+            let mut within = place_m.iter().zip(sides_m);
+            within.all(|(m, (low, high))| (f64::from(*low)..=f64::from(*high)).contains(m))
+        };
+        self.tracks
+            .retain(|track| track.last_measured >= since || !is_within(track));
     }
 
     /// What each cluster of the last revolution looks like.
@@ -399,6 +413,34 @@ mod tests {
         assert_eq!((tracker.tracks.len(), tracker.next_id), (1, 1));
         (0..6).for_each(|_| see(&mut tracker, &body(0, 0)));
         assert_eq!((tracker.tracks.len(), tracker.next_id), (0, 1));
+    }
+
+    #[test]
+    fn what_is_not_seen_any_more_where_the_own_vehicle_is_was_a_piece_of_it() {
+        let scan = body(1000, 0);
+        let spots = spots_of(&scan);
+        let sensor = Pose::SENSOR;
+        let left = |far_m: f32, since_s: f64| {
+            let mut tracker = ObjectTracker {
+                tracks: vec![track_of(1, &spots, &scan)],
+                ..ObjectTracker::default()
+            };
+            let [x, y] = tracker.tracks[0]
+                .position_m()
+                .map(|metres| metres as f32)
+                .into();
+            let own_vehicle = Extent {
+                low_m: [x - far_m, y - far_m, -1.0],
+                high_m: [x + far_m, y + far_m, 0.0],
+            };
+            let since = scan.time() + Span::from_seconds(since_s);
+            tracker.forget_pieces(&own_vehicle, &sensor, since);
+            tracker.tracks.len()
+        };
+        assert_eq!(
+            [left(0.5, -0.3), left(0.5, 0.3), left(-0.5, 0.3)],
+            [1, 0, 1]
+        );
     }
 
     #[test]
