@@ -517,6 +517,7 @@ mod tests {
             });
             see(&mut tracker, &later(&scan, 0.1 * revolution as f64));
         }
+        tracker.tracks[0].was_likely = true;
         let measured = |tracker: &ObjectTracker| {
             let [track] = &tracker.tracks[..] else {
                 panic!("{}", tracker.tracks.len());
