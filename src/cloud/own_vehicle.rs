@@ -32,6 +32,16 @@ pub struct Extent {
     pub high_m: [f32; 3],
 }
 
+impl Extent {
+    /// Whether a place of the sensor frame is on the vehicle, seen from above.
+    pub fn contains(&self, at_m: [f64; 2]) -> bool {
+        (0..2).all(|axis| {
+            let [low_m, high_m] = [self.low_m, self.high_m].map(|end_m| f64::from(end_m[axis]));
+            (low_m..=high_m).contains(&at_m[axis])
+        })
+    }
+}
+
 /// One direction.
 #[derive(Debug, Clone, Copy)]
 struct Cell {

@@ -295,9 +295,12 @@ impl Tracker {
         &self.expected
     }
 
-    /// Forgets who was not seen for two revolutions where the own vehicle turned out to be, in the sensor frame of a sweep.
+    /// Forgets who was not seen in the last revolution where the own vehicle turned out to be, given the sensor's pose in a
+    /// sweep.
     pub fn forget_pieces(&mut self, own_vehicle: &Extent, scan: &Scan, sweep: &Sweep) {
-        let since = scan.time() + Span::from_seconds(-2.5 * scan.duration_s());
+        /// Returns of the revolution before this one are two old at most; half of one more is for jitter.
+        const UNSEEN_REVOLUTIONS: f64 = 2.5;
+        let since = scan.time() + Span::from_seconds(-UNSEEN_REVOLUTIONS * scan.duration_s());
         self.by_object
             .forget_pieces(own_vehicle, &sweep.sensor, since);
     }

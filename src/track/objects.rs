@@ -69,14 +69,10 @@ impl ObjectTracker {
     /// Forgets who was not seen since a time where the own vehicle turned out to be: it was a piece of that.
     pub(super) fn forget_pieces(&mut self, own_vehicle: &Extent, sensor: &Pose, since: Time) {
         let placement = sensor.placement();
-        let is_within = |track: &Track| {
+        self.tracks.retain(|track| {
             let place_m = placement.sensor_m(track.position_m().into());
-            let sides_m = own_vehicle.low_m.iter().zip(&own_vehicle.high_m);
-            let mut within = place_m.iter().zip(sides_m);
-            within.all(|(m, (low, high))| (f64::from(*low)..=f64::from(*high)).contains(m))
-        };
-        self.tracks
-            .retain(|track| track.last_measured >= since || !is_within(track));
+            track.last_measured >= since || !own_vehicle.contains(place_m)
+        });
     }
 
     /// What each cluster of the last revolution looks like.
