@@ -3,6 +3,7 @@
 mod groups;
 mod overgrown;
 mod passage;
+mod pavement;
 mod places;
 mod roads;
 mod roundabouts;
@@ -116,6 +117,13 @@ pub(super) const ALL: &[Scenario] = &[
         summary: "a street with cyclists and people on foot in groups, one behind another and side by \
                   side, whom the vehicle follows, overtakes and meets",
         build: groups::groups,
+        roads: None,
+    },
+    Scenario {
+        name: "pavement",
+        summary: "a street between fronts, walls and hedges, close to which people walk and wait, before and \
+                  behind parked vehicles",
+        build: pavement::pavement,
         roads: None,
     },
 ];

@@ -91,22 +91,7 @@ fn garden(
     let (length_m, middle_m) = (to_m - from_m, 0.5 * (from_m + to_m));
     match pick(random, &[0.3, 0.2, 0.15, 0.1, 0.15, 0.05]) {
         Some(0) => thicket(random, scenery, side, front_m, [from_m, to_m]),
-        Some(1) => {
-            // A hedge, cut once and grown since.
-            let high_m = between(random, 0.6, 2.6);
-            let mut along_m = from_m;
-            while along_m < to_m {
-                let radius_m = between(random, 0.3, 0.6);
-                let heights_m = [
-                    between(random, 0.0, 0.2),
-                    high_m * between(random, 0.75, 1.25),
-                ];
-                let way_m = between(random, 0.1, 0.5);
-                let across_m = front_m + 0.4 + between(random, -0.2, 0.2);
-                scenery.clump([side * across_m, along_m], radius_m, heights_m, way_m);
-                along_m += between(random, 0.4, 0.9);
-            }
-        }
+        Some(1) => hedge(random, scenery, side, front_m, [from_m, to_m]),
         Some(2) => {
             let high_m = between(random, 0.5, 3.0);
             scenery.wall([side * front_m, middle_m], 90.0, length_m, high_m);
@@ -144,6 +129,29 @@ fn garden(
         let across_m = front_m + between(random, -1.0, 3.0);
         let along_m = between(random, from_m, to_m);
         tree(random, scenery, [side * across_m, along_m]);
+    }
+}
+
+/// A hedge, cut once and grown since.
+pub(super) fn hedge(
+    random: &mut Random,
+    scenery: &mut Scenery,
+    side: f64,
+    front_m: f64,
+    [from_m, to_m]: [f64; 2],
+) {
+    let high_m = between(random, 0.6, 2.6);
+    let mut along_m = from_m;
+    while along_m < to_m {
+        let radius_m = between(random, 0.3, 0.6);
+        let heights_m = [
+            between(random, 0.0, 0.2),
+            high_m * between(random, 0.75, 1.25),
+        ];
+        let way_m = between(random, 0.1, 0.5);
+        let across_m = front_m + 0.4 + between(random, -0.2, 0.2);
+        scenery.clump([side * across_m, along_m], radius_m, heights_m, way_m);
+        along_m += between(random, 0.4, 0.9);
     }
 }
 
@@ -201,7 +209,7 @@ fn tree(random: &mut Random, scenery: &mut Scenery, at_m: [f64; 2]) {
 }
 
 /// A house with bays, steps and recesses.
-fn front(
+pub(super) fn front(
     random: &mut Random,
     scenery: &mut Scenery,
     side: f64,

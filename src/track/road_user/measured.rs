@@ -203,6 +203,7 @@ impl Track {
             speed_mps: self.speed_mps,
             moved: self.moves && self.travelled_m > self.telling_way_m(),
             surely_moves: self.surely_moves(),
+            has_come: self.is_confirmed() && self.is_new(),
             whole_m: (self.shape.whole[0] > 0.3).then_some(length_m),
             wide_m: (self.shape.whole[1] > 0.5).then_some(width_m),
             range_m: self.range_m,

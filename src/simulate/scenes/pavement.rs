@@ -1,0 +1,84 @@
+//! People who walk and wait close to the fronts of a street, before and behind parked vehicles.
+
+use super::actor;
+use super::overgrown::{front, hedge};
+use super::strangers::{along_the_street, between, parked, person, pick, stand_at_kerb};
+use crate::random::Random;
+use crate::simulate::path::Path;
+use crate::simulate::scenario::{PoseMessages, Scene};
+use crate::simulate::scenery::Scenery;
+use crate::simulate::terrain::Terrain;
+
+/// How far the street reaches to the north and to the south.
+const REACH_M: [f64; 2] = [-20.0, 100.0];
+/// From the middle of the street to the middle of what stands at the kerb.
+const KERB_M: f64 = 4.7;
+/// Least and greatest distance from there to the fronts.
+const FRONT_M: [f64; 2] = [2.2, 4.5];
+/// Least and greatest distance from a front to the middle of who walks along it.
+const BESIDE_M: [f64; 2] = [0.45, 1.2];
+
+pub(super) fn pavement(random: &mut Random) -> Scene {
+    let terrain = Terrain {
+        swells: vec![],
+        unevenness_m: between(random, 0.0, 0.03),
+    };
+    let mut scenery = Scenery::on(&terrain);
+    let mut actors = vec![];
+    for side in [-1.0, 1.0] {
+        let parked_share = between(random, 0.1, 0.6);
+        let mut along_m = REACH_M[0];
+        while along_m < REACH_M[1] {
+            let at_m = [side * KERB_M, along_m];
+            let mut room_m = between(random, 5.2, 7.5);
+            if random.uniform() < parked_share {
+                let actor = parked(random, at_m);
+                room_m = room_m.max(2.0 * (actor.path.at(0.0).position_m[1] - along_m) + 7.0);
+                actors.push(actor);
+            } else if random.uniform() < 0.3 {
+                stand_at_kerb(random, &mut scenery, at_m);
+            }
+            along_m += room_m;
+        }
+        let front_m = KERB_M + between(random, FRONT_M[0], FRONT_M[1]);
+        let mut along_m = REACH_M[0];
+        while along_m < REACH_M[1] {
+            let length_m = between(random, 4.0, 20.0);
+            let stretch_m = [along_m, along_m + length_m];
+            match pick(random, &[0.5, 0.2, 0.2]) {
+                Some(0) => front(random, &mut scenery, side, front_m, stretch_m),
+                Some(1) => {
+                    let middle_m = [side * front_m, along_m + 0.5 * length_m];
+                    let high_m = between(random, 0.6, 3.0);
+                    scenery.wall(middle_m, 90.0, length_m, high_m);
+                }
+                Some(2) => hedge(random, &mut scenery, side, front_m, stretch_m),
+                _ => {}
+            }
+            along_m += length_m;
+        }
+        for yaw_deg in [90.0, -90.0] {
+            let mut along_m = REACH_M[0] + between(random, 0.0, 10.0);
+            while along_m < REACH_M[1] {
+                let beside_m = between(random, BESIDE_M[0], BESIDE_M[1]);
+                let at_m = [side * (front_m - beside_m), along_m];
+                let path = if random.uniform() < 0.2 {
+                    Path::parked(at_m, between(random, 0.0, 360.0))
+                } else {
+                    Path::straight(at_m, yaw_deg, between(random, 0.5, 1.8))
+                };
+                actors.push(actor(person(random), path));
+                along_m += between(random, 6.0, 25.0);
+            }
+        }
+    }
+    Scene {
+        sensor_height_m: between(random, 1.5, 2.2),
+        ego: along_the_street(between(random, 0.0, 8.0)),
+        poses: PoseMessages::None,
+        actors,
+        scenery,
+        terrain,
+        range_deviation_m: between(random, 0.01, 0.04),
+    }
+}
