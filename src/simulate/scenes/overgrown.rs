@@ -2,14 +2,14 @@
 
 use super::strangers::{add_column, along_the_street, between, parked, pick, stand_at_kerb};
 use crate::random::Random;
-use crate::simulate::scenario::{PoseMessages, Scene};
+use crate::simulate::scenario::{Actor, PoseMessages, Scene};
 use crate::simulate::scenery::Scenery;
 use crate::simulate::terrain::{Swell, Terrain};
 
 /// How far the street reaches to the north and to the south.
 const REACH_M: [f64; 2] = [-20.0, 120.0];
 /// From the middle of the street to the middle of what stands at the kerb.
-const KERB_M: f64 = 4.7;
+pub(super) const KERB_M: f64 = 4.7;
 /// Least and greatest distance from there to the front of the gardens.
 const GARDEN_M: [f64; 2] = [1.4, 6.0];
 
@@ -36,20 +36,8 @@ pub(super) fn overgrown(random: &mut Random) -> Scene {
     let mut scenery = Scenery::on(&terrain);
     let mut actors = vec![];
     for side in [-1.0, 1.0] {
-        let parked_share = between(random, 0.15, 0.9);
-        let mut along_m = REACH_M[0];
-        while along_m < REACH_M[1] {
-            let at_m = [side * KERB_M, along_m];
-            let mut room_m = between(random, 5.2, 7.5);
-            if random.uniform() < parked_share {
-                let actor = parked(random, at_m);
-                room_m = room_m.max(2.0 * (actor.path.at(0.0).position_m[1] - along_m) + 7.0);
-                actors.push(actor);
-            } else if random.uniform() < 0.5 {
-                stand_at_kerb(random, &mut scenery, at_m);
-            }
-            along_m += room_m;
-        }
+        let shares = [between(random, 0.15, 0.9), 0.5];
+        kerb(random, &mut scenery, &mut actors, side, REACH_M, shares);
         let mut front_m = between(random, GARDEN_M[0], GARDEN_M[1]);
         let mut along_m = REACH_M[0];
         while along_m < REACH_M[1] {
@@ -77,6 +65,30 @@ pub(super) fn overgrown(random: &mut Random) -> Scene {
         scenery,
         terrain,
         range_deviation_m: between(random, 0.01, 0.04),
+    }
+}
+
+/// What stands at the kerb of a side: a share of the places hold a parked vehicle, and a share of the others something else.
+pub(super) fn kerb(
+    random: &mut Random,
+    scenery: &mut Scenery,
+    actors: &mut Vec<Actor>,
+    side: f64,
+    [from_m, to_m]: [f64; 2],
+    [parked_share, other_share]: [f64; 2],
+) {
+    let mut along_m = from_m;
+    while along_m < to_m {
+        let at_m = [side * KERB_M, along_m];
+        let mut room_m = between(random, 5.2, 7.5);
+        if random.uniform() < parked_share {
+            let actor = parked(random, at_m);
+            room_m = room_m.max(2.0 * (actor.path.at(0.0).position_m[1] - along_m) + 7.0);
+            actors.push(actor);
+        } else if random.uniform() < other_share {
+            stand_at_kerb(random, scenery, at_m);
+        }
+        along_m += room_m;
     }
 }
 

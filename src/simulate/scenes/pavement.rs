@@ -1,8 +1,8 @@
 //! People who walk and wait close to the fronts of a street, before and behind parked vehicles.
 
 use super::actor;
-use super::overgrown::{front, hedge};
-use super::strangers::{along_the_street, between, parked, person, pick, stand_at_kerb};
+use super::overgrown::{KERB_M, front, hedge, kerb};
+use super::strangers::{along_the_street, between, person, pick};
 use crate::random::Random;
 use crate::simulate::path::Path;
 use crate::simulate::scenario::{PoseMessages, Scene};
@@ -11,9 +11,7 @@ use crate::simulate::terrain::Terrain;
 
 /// How far the street reaches to the north and to the south.
 const REACH_M: [f64; 2] = [-20.0, 100.0];
-/// From the middle of the street to the middle of what stands at the kerb.
-const KERB_M: f64 = 4.7;
-/// Least and greatest distance from there to the fronts.
+/// Least and greatest distance from the middle of what stands at the kerb to the fronts.
 const FRONT_M: [f64; 2] = [2.2, 4.5];
 /// Least and greatest distance from a front to the middle of who walks along it.
 const BESIDE_M: [f64; 2] = [0.45, 1.2];
@@ -26,20 +24,8 @@ pub(super) fn pavement(random: &mut Random) -> Scene {
     let mut scenery = Scenery::on(&terrain);
     let mut actors = vec![];
     for side in [-1.0, 1.0] {
-        let parked_share = between(random, 0.1, 0.6);
-        let mut along_m = REACH_M[0];
-        while along_m < REACH_M[1] {
-            let at_m = [side * KERB_M, along_m];
-            let mut room_m = between(random, 5.2, 7.5);
-            if random.uniform() < parked_share {
-                let actor = parked(random, at_m);
-                room_m = room_m.max(2.0 * (actor.path.at(0.0).position_m[1] - along_m) + 7.0);
-                actors.push(actor);
-            } else if random.uniform() < 0.3 {
-                stand_at_kerb(random, &mut scenery, at_m);
-            }
-            along_m += room_m;
-        }
+        let shares = [between(random, 0.1, 0.6), 0.3];
+        kerb(random, &mut scenery, &mut actors, side, REACH_M, shares);
         let front_m = KERB_M + between(random, FRONT_M[0], FRONT_M[1]);
         let mut along_m = REACH_M[0];
         while along_m < REACH_M[1] {
