@@ -5,16 +5,18 @@ use super::overgrown::{KERB_M, front, hedge, kerb};
 use super::strangers::{along_the_street, between, person, pick};
 use crate::random::Random;
 use crate::simulate::path::Path;
-use crate::simulate::scenario::{PoseMessages, Scene};
+use crate::simulate::scenario::{Actor, PoseMessages, Scene};
 use crate::simulate::scenery::Scenery;
 use crate::simulate::terrain::Terrain;
 
 /// How far the street reaches to the north and to the south.
 const REACH_M: [f64; 2] = [-20.0, 100.0];
 /// Least and greatest distance from the middle of what stands at the kerb to the fronts.
-const FRONT_M: [f64; 2] = [2.2, 4.5];
-/// Least and greatest distance from a front to the middle of who walks along it.
-const BESIDE_M: [f64; 2] = [0.45, 1.2];
+const FRONT_M: [f64; 2] = [3.0, 4.8];
+/// Least and greatest distance from a front to the middle of who walks along it or waits there.
+const BESIDE_M: [f64; 2] = [0.45, 1.0];
+/// Share of the sides on which all wait: nobody walks into anybody.
+const WAITING: f64 = 0.3;
 
 pub(super) fn pavement(random: &mut Random) -> Scene {
     let terrain = Terrain {
@@ -43,20 +45,7 @@ pub(super) fn pavement(random: &mut Random) -> Scene {
             }
             along_m += length_m;
         }
-        for yaw_deg in [90.0, -90.0] {
-            let mut along_m = REACH_M[0] + between(random, 0.0, 10.0);
-            while along_m < REACH_M[1] {
-                let beside_m = between(random, BESIDE_M[0], BESIDE_M[1]);
-                let at_m = [side * (front_m - beside_m), along_m];
-                let path = if random.uniform() < 0.2 {
-                    Path::parked(at_m, between(random, 0.0, 360.0))
-                } else {
-                    Path::straight(at_m, yaw_deg, between(random, 0.5, 1.8))
-                };
-                actors.push(actor(person(random), path));
-                along_m += between(random, 6.0, 25.0);
-            }
-        }
+        add_people(random, &mut actors, side, front_m);
     }
     Scene {
         sensor_height_m: between(random, 1.5, 2.2),
@@ -66,5 +55,24 @@ pub(super) fn pavement(random: &mut Random) -> Scene {
         scenery,
         terrain,
         range_deviation_m: between(random, 0.01, 0.04),
+    }
+}
+
+/// People along the fronts of a side: all walk in one direction at one speed, or all wait.
+fn add_people(random: &mut Random, actors: &mut Vec<Actor>, side: f64, front_m: f64) {
+    let waits = random.uniform() < WAITING;
+    let yaw_deg = if random.uniform() < 0.5 { 90.0 } else { -90.0 };
+    let speed_mps = between(random, 0.5, 1.8);
+    let mut along_m = REACH_M[0] + between(random, 0.0, 10.0);
+    while along_m < REACH_M[1] {
+        let beside_m = between(random, BESIDE_M[0], BESIDE_M[1]);
+        let at_m = [side * (front_m - beside_m), along_m];
+        let path = if waits {
+            Path::parked(at_m, between(random, 0.0, 360.0))
+        } else {
+            Path::straight(at_m, yaw_deg, speed_mps)
+        };
+        actors.push(actor(person(random), path));
+        along_m += between(random, 3.0, 15.0);
     }
 }
