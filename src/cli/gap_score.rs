@@ -13,6 +13,8 @@ use crate::track::{Class, Object};
 const LONG_GAP_S: f64 = 4.0;
 /// And that stays open so long: a shorter one is as long as it must be at one moment, and cannot be used.
 const OPEN_S: f64 = 0.5;
+/// A gap that opens sooner after the first revolution is not counted: who has just begun to look has not seen everybody.
+const WARM_UP_S: f64 = 2.0;
 /// Between its first and its last revolution a gap is open for one less than in all.
 const REVOLUTION_S: f64 = 0.1;
 /// Announcements that are wrong by more than this are no matter of rounding.
@@ -37,6 +39,8 @@ pub(super) struct GapScore {
     exits: Vec<WayScore>,
     /// The arm that the vehicle was at first.
     own_arm: Option<usize>,
+    /// Time of the first revolution.
+    began_s: Option<f64>,
     revolutions: usize,
     agreed: usize,
     comings: Comings,
@@ -72,6 +76,7 @@ impl GapScore {
             entries: vec![],
             exits: vec![],
             own_arm: None,
+            began_s: None,
             revolutions: 0,
             agreed: 0,
             comings: Comings::default(),
@@ -90,13 +95,15 @@ impl GapScore {
         self.exits.resize_with(count, WayScore::default);
         self.own_arm = self.own_arm.or(true_advice.own_arm);
         self.revolutions += count;
+        let now_s = truth.time.seconds();
+        let is_warm = now_s - *self.began_s.get_or_insert(now_s) >= WARM_UP_S;
         let arms = advice.arms.iter().zip(&true_advice.arms);
         let scores = self.entries.iter_mut().zip(&mut self.exits);
         for ((said, known), (entry, exit)) in arms.zip(scores) {
             self.agreed += usize::from(said.entry.may_go == known.entry.may_go);
-            let now_s = truth.time.seconds();
-            entry.take(&said.entry, &known.entry, self.margin_s, now_s);
-            exit.take(&said.exit, &known.exit, self.margin_s, now_s);
+            let margin_s = self.margin_s;
+            entry.take(&said.entry, &known.entry, margin_s, now_s, is_warm);
+            exit.take(&said.exit, &known.exit, margin_s, now_s, is_warm);
         }
         let pairs = pairs(objects, truth.objects);
         compare_lanes(&mut self.lanes, advice, true_advice, truth.objects, &pairs);
@@ -158,7 +165,14 @@ fn gaps_of(ways: &[WayScore]) -> String {
 }
 
 impl WayScore {
-    fn take(&mut self, said: &Crossing, known: &Crossing, margin_s: f64, now_s: f64) {
+    fn take(
+        &mut self,
+        said: &Crossing,
+        known: &Crossing,
+        margin_s: f64,
+        now_s: f64,
+        is_warm: bool,
+    ) {
         let short_s = margin_s - known.margin_s;
         let gap_s = known.gap_s;
         let (said, known) = (said.may_go, known.may_go);
@@ -168,7 +182,7 @@ impl WayScore {
             self.clearly_unsafe += usize::from(!known && short_s > CLEARLY_S);
         }
         self.was_open = said;
-        let begins = known && !self.was_truly_open && gap_s >= LONG_GAP_S;
+        let begins = is_warm && known && !self.was_truly_open && gap_s >= LONG_GAP_S;
         if begins {
             self.gaps.push(TrueGap {
                 from_s: now_s,

@@ -151,6 +151,7 @@ mod tests {
                 offset_m: 1.0,
                 speed_mps: 1.0,
                 mean_speed_mps: 1.0,
+                known_s: 1.0,
             },
         };
         let soon = Window {

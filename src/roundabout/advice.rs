@@ -2,7 +2,7 @@
 
 use super::gap::{self, Asked, OwnMotion, User};
 use super::lanes::{OnLane, Place};
-use super::sight::Unseen;
+use super::unseen::Unseen;
 use super::{RoundaboutParameters, Window};
 use crate::roadmap::Ring;
 
@@ -159,6 +159,7 @@ impl Crossing {
             stop_m: asked.stop_m - motion.front_m,
             seen_share: 1.0,
         };
+        let least_margin_s = parameters.margin_s + asked.caution_s;
         for (number, conflict) in asked.conflicts.iter().enumerate() {
             let [begin_s, end_s] = motion.window_s(conflict, parameters);
             if end_s <= 0.0 {
@@ -172,23 +173,23 @@ impl Crossing {
             let at_point = comers.iter().filter(|window| window.conflict == number);
             for window in at_point {
                 // Gone before the vehicle comes.
-                if window.end_s + gap::BEHIND_S <= begin_s {
+                if window.end_s + gap::BEHIND_S + asked.caution_s <= begin_s {
                     continue;
                 }
                 let margin_s = window.begin_s - end_s;
                 advice.gap_s = advice.gap_s.min(window.begin_s);
                 if margin_s < advice.margin_s {
                     advice.margin_s = margin_s;
-                    if margin_s < asked.margin_s {
+                    if margin_s < least_margin_s {
                         advice.hindrance = Some(Hindrance::RoadUser(window.object_id));
                     }
                 }
             }
             if let Some(unseen) = unseen {
                 let (comes_s, seen_share) =
-                    unseen.before(asked.site, conflict, parameters.speed_mps);
+                    unseen.before(asked.site, asked.arm, conflict, parameters.speed_mps);
                 advice.seen_share = advice.seen_share.min(seen_share);
-                if comes_s - end_s < asked.margin_s && advice.hindrance.is_none() {
+                if comes_s - end_s < least_margin_s && advice.hindrance.is_none() {
                     advice.hindrance = Some(Hindrance::Unseen);
                 }
             }

@@ -66,10 +66,9 @@ impl Watcher {
             conflicts: &[],
             width_m: 0.0,
             stop_m: 0.0,
-            now: situation.time,
             road_mps: self.parameters.speed_mps,
             is_seen,
-            margin_s: self.margin_s(number, false, is_seen),
+            caution_s: self.caution_s(number, false, is_seen),
         };
         let mut crossing = |asked: Asked<'_>, motion: &OwnMotion| {
             self.crossing(&asked, motion, users, situation, windows)
@@ -100,7 +99,7 @@ impl Watcher {
             let asked = Asked {
                 stop_m: waits.front_m,
                 at_exit: true,
-                margin_s: self.margin_s(number, true, is_seen),
+                caution_s: self.caution_s(number, true, is_seen),
                 conflicts: &exit.conflicts,
                 width_m: exit.width_m,
                 ..asked
@@ -114,15 +113,14 @@ impl Watcher {
         }
     }
 
-    /// What a gap at a way in or out must leave, where road users are seen or known.
-    pub(super) fn margin_s(&self, arm: usize, at_exit: bool, is_seen: bool) -> f64 {
+    /// What a gap at a way in or out must leave beyond the margin.
+    pub(super) fn caution_s(&self, arm: usize, at_exit: bool, is_seen: bool) -> f64 {
         let announced = self.announced.get(arm);
         let is_announced = announced.is_some_and(|ways| ways[usize::from(at_exit)]);
-        let margin_s = self.parameters.margin_s;
         match (is_seen, is_announced) {
-            (true, false) => margin_s + CAUTION_S,
-            (true, true) => margin_s - CAUTION_S,
-            (false, _) => margin_s,
+            (true, false) => CAUTION_S,
+            (true, true) => -CAUTION_S,
+            (false, _) => 0.0,
         }
     }
 

@@ -2,9 +2,10 @@
 //!
 //! Numbers without another source were set with `scripts/evaluate-roundabouts --seeds 1-8`.
 
+use super::gap::NEW_S;
 use super::site::Site;
 use crate::ego::wrapped_rad;
-use crate::roadmap::LaneKind;
+use crate::roadmap::{LaneKind, Polyline};
 use crate::track::{Class, Object};
 
 /// A lane of the site.
@@ -35,6 +36,45 @@ pub struct OnLane {
     pub speed_mps: f64,
     /// The same in the mean of the last moments.
     pub mean_speed_mps: f64,
+    /// For how long somebody has been watched without a break.
+    pub known_s: f64,
+}
+
+impl OnLane {
+    /// So much further along the lane: from a way in onto the circle.
+    fn moved_on(self, site: &Site, gone_m: f64) -> Self {
+        let along_m = self.along_m + gone_m;
+        let (Place::Entry(arm, lane), Some(road)) = (self.place, site.outermost_road()) else {
+            return Self { along_m, ..self };
+        };
+        let way = &site.arms[arm].entries[lane].way;
+        let past_m = along_m - way.length_m();
+        if past_m < 0.0 {
+            return Self { along_m, ..self };
+        }
+        let side = if site.is_clockwise { -1.0 } else { 1.0 };
+        let radius_m = site.rings[road].circle.radius_m;
+        let met_rad = site.angle_rad(way.at(way.length_m()).0);
+        Self {
+            place: Place::Ring(road),
+            along_m: radius_m * met_rad + side * past_m,
+            ..self
+        }
+    }
+
+    /// Where that is in the local frame; nowhere on none.
+    pub(super) fn place_m(&self, site: &Site) -> Option<[f64; 2]> {
+        let on_way = |way: &Polyline| way.at(self.along_m).0;
+        match self.place {
+            Place::Ring(ring) => {
+                let circle = site.rings[ring].circle;
+                Some(circle.at(self.along_m / circle.radius_m))
+            }
+            Place::Entry(arm, lane) => Some(on_way(&site.arms[arm].entries[lane].way)),
+            Place::Exit(arm, lane) => Some(on_way(&site.arms[arm].exits[lane].way)),
+            Place::Elsewhere => None,
+        }
+    }
 }
 
 /// What the filter remembers of a road user: lanes with their probabilities.
@@ -43,6 +83,10 @@ pub(super) struct Belief {
     lanes: Vec<(Place, f64)>,
     /// In the mean of the last moments, if he was seen before.
     mean_speed_mps: Option<f64>,
+    /// For how long he has been known.
+    known_s: f64,
+    /// Where he most likely was when he was measured last, moved on since.
+    last: Vec<OnLane>,
 }
 
 /// What is remembered of all of them, in places that are used again.
@@ -60,6 +104,8 @@ impl Beliefs {
                 *id = None;
                 belief.lanes.clear();
                 belief.mean_speed_mps = None;
+                belief.known_s = 0.0;
+                belief.last.clear();
             }
         }
     }
@@ -148,9 +194,21 @@ impl Belief {
         candidates: &mut Vec<Candidate>,
         found: &mut Vec<OnLane>,
     ) {
+        if !object.measured && !self.last.is_empty() {
+            // Who is hidden goes on along his lane, wherever straight on would lead.
+            for on in &mut self.last {
+                *on = on.moved_on(site, on.mean_speed_mps * passed_s);
+                on.known_s += passed_s;
+            }
+            found.clone_from(&self.last);
+            return;
+        }
         take_candidates(site, object, candidates);
         let (_, speed_mps) = course(object);
-        let mean_mps = self.mean_speed_mps.unwrap_or(speed_mps);
+        self.known_s += passed_s;
+        // It takes a while before the tracker knows the speed of who is new.
+        let settled = self.mean_speed_mps.filter(|_| self.known_s >= NEW_S);
+        let mean_mps = settled.unwrap_or(speed_mps);
         let mean_mps = mean_mps + MEAN_SHARE * (speed_mps - mean_mps);
         self.mean_speed_mps = Some(mean_mps);
         let gone_m = speed_mps * passed_s;
@@ -167,6 +225,7 @@ impl Belief {
             if probability >= LEAST_PROBABILITY {
                 found.push(OnLane {
                     probability,
+                    known_s: self.known_s,
                     mean_speed_mps: if speed_mps > 0.0 {
                         mean_mps / speed_mps * candidate.on.speed_mps
                     } else {
@@ -177,6 +236,7 @@ impl Belief {
             }
         }
         found.sort_unstable_by(|a, b| b.probability.total_cmp(&a.probability));
+        self.last.clone_from(found);
     }
 
     /// How probable a lane is before it is known where somebody is now.
@@ -213,6 +273,7 @@ fn take_candidates(site: &Site, object: &Object, found: &mut Vec<Candidate>) {
         offset_m: 0.0,
         speed_mps: object.speed_mps,
         mean_speed_mps: 0.0,
+        known_s: 0.0,
     };
     found.push(Candidate::new(nowhere, ELSEWHERE));
     found.extend((0..site.rings.len()).filter_map(|ring| on_ring(site, ring, object)));
@@ -296,8 +357,10 @@ fn on_ring(site: &Site, index: usize, object: &Object) -> Option<Candidate> {
     let (course_rad, speed_mps) = course(object);
     let heading_rad = if is_along { tangent_rad } else { back_rad };
     let leads = libm::cos(course_rad - heading_rad);
-    // Who changes lanes goes round as fast as he goes.
-    let leads_mps = if ring.kind == LaneKind::Road && leads > LEADS {
+    // Who changes lanes goes round as fast as he goes, and who comes in will.
+    let is_inward = libm::cos(course_rad - angle_rad) < 0.0;
+    let goes_round = leads > if is_inward { 0.0 } else { LEADS };
+    let leads_mps = if ring.kind == LaneKind::Road && goes_round {
         speed_mps
     } else {
         speed_mps * leads
@@ -309,6 +372,7 @@ fn on_ring(site: &Site, index: usize, object: &Object) -> Option<Candidate> {
         offset_m,
         speed_mps: if is_along { leads_mps } else { -leads_mps },
         mean_speed_mps: 0.0,
+        known_s: 0.0,
     };
     let likelihood =
         place_fit(object, offset_m, ring.width_m) * fit * share(object.class, ring.kind);
@@ -318,7 +382,7 @@ fn on_ring(site: &Site, index: usize, object: &Object) -> Option<Candidate> {
 /// `before_per_m` is the curvature of what leads to the way: nobody turns the wheel at once, and a turn rate is told late.
 fn on_way(
     place: Place,
-    way: &crate::roadmap::Polyline,
+    way: &Polyline,
     width_m: f64,
     before_per_m: f64,
     object: &Object,
@@ -346,6 +410,7 @@ fn on_way(
         offset_m: station.offset_m,
         speed_mps: speed_mps * leads,
         mean_speed_mps: 0.0,
+        known_s: 0.0,
     };
     let likelihood =
         place_fit(object, station.offset_m, width_m) * fit * share(object.class, LaneKind::Road);
@@ -353,7 +418,7 @@ fn on_way(
 }
 
 /// By the directions a little before and after.
-fn curvature_per_m(way: &crate::roadmap::Polyline, along_m: f64) -> f64 {
+fn curvature_per_m(way: &Polyline, along_m: f64) -> f64 {
     const STEP_M: f64 = 2.0;
     let [(_, before_rad), (_, after_rad)] =
         [-STEP_M, STEP_M].map(|step_m| way.at(along_m + step_m));

@@ -12,6 +12,7 @@ mod lanes;
 mod own;
 mod sight;
 mod site;
+mod unseen;
 
 use crate::ego::Pose;
 use crate::ego::geodesy::Geodetic;
@@ -20,9 +21,10 @@ use crate::roadmap::{DrivenRoundabout, Origin, Roadmap, Roundabout, roundabouts,
 use crate::time::Time;
 use crate::track::Object;
 use finder::Finder;
+use gap::Users;
 use lanes::{Beliefs, Candidate};
-use sight::Unseen;
 use site::{Placing, Site};
+use unseen::Unseen;
 
 pub use advice::{Advice, ArmAdvice, Crossing, Hindrance, State, UserOnLane};
 pub use gap::Window;
@@ -217,6 +219,11 @@ impl Watcher {
             let belief = self.beliefs.of(object.id);
             belief.update(site, object, passed_s, &mut self.candidates, lanes);
         }
+        let users = Users {
+            objects,
+            lanes: &self.lanes,
+        };
+        self.unseen.note_listed(site, users);
         self.advise(index, situation);
     }
 

@@ -72,6 +72,18 @@ fn situation(objects: &[Object]) -> Situation<'_> {
     }
 }
 
+/// Who is watched for so long is no newcomer.
+fn known(objects: &[Object]) -> Watcher {
+    let mut watcher = watcher();
+    for micros in [-1_100_000, -100_000] {
+        watcher.watch(&Situation {
+            time: Time::from_micros(NOW.micros() + micros),
+            ..situation(objects)
+        });
+    }
+    watcher
+}
+
 fn own_arm(watcher: &Watcher) -> &ArmAdvice {
     let advice = watcher.advice().unwrap();
     &advice.arms[advice.own_arm.unwrap()]
@@ -171,10 +183,10 @@ fn everybody_is_on_the_lane_of_his_kind() {
 /// A car that slows for the corner of a way in is still waited for; one that stands there gives way.
 #[test]
 fn who_stands_at_another_arm_gives_way() {
-    let mut watcher = watcher();
     let mut waits = round(Class::Car, ROAD_M, 180.0, 0.0);
     waits.centre_m = [CENTRE_M[0] - 22.0, CENTRE_M[1] - 1.75, 0.7];
     (waits.yaw_rad, waits.yaw_rate_radps) = (0.0, 0.0);
+    let mut watcher = known(std::slice::from_ref(&waits));
     watcher.watch(&situation(std::slice::from_ref(&waits)));
     assert!(own_arm(&watcher).entry.may_go, "{:?}", own_arm(&watcher));
     waits.speed_mps = 6.0;
@@ -205,25 +217,58 @@ fn who_is_on_a_way_in_comes_whichever_way_he_seems_to_be_turned() {
 #[test]
 fn a_gap_opens_with_caution_where_road_users_are_seen_and_stays_below_the_margin() {
     let mut watcher = watcher();
-    let margin_s = watcher.parameters.margin_s;
-    assert_eq!(watcher.margin_s(1, false, false), margin_s);
-    assert_eq!(watcher.margin_s(1, false, true), margin_s + CAUTION_S);
+    assert_eq!(watcher.caution_s(1, false, false), 0.0);
+    assert_eq!(watcher.caution_s(1, false, true), CAUTION_S);
     watcher.watch(&situation(&[]));
     assert!(own_arm(&watcher).entry.may_go);
-    assert_eq!(watcher.margin_s(1, false, true), margin_s - CAUTION_S);
+    assert_eq!(watcher.caution_s(1, false, true), -CAUTION_S);
     watcher.forget();
-    assert_eq!(watcher.margin_s(1, false, true), margin_s + CAUTION_S);
+    assert_eq!(watcher.caution_s(1, false, true), CAUTION_S);
+}
+
+/// Where he goes straight on is not where he is.
+#[test]
+fn who_is_hidden_goes_on_along_his_lane() {
+    // Along the northern arm's way in, which leads to the circle in a bend.
+    let mut comes = round(Class::Car, ROAD_M, 90.0, 7.0);
+    comes.centre_m = [CENTRE_M[0] - 1.75, CENTRE_M[1] + 25.0, 0.7];
+    (comes.yaw_rad, comes.yaw_rate_radps) = (-PI / 2.0, 0.0);
+    let mut watcher = known(std::slice::from_ref(&comes));
+    let place = |watcher: &Watcher| watcher.advice().unwrap().users[0].on.place;
+    assert!(matches!(place(&watcher), Place::Entry(..)));
+    comes.measured = false;
+    let mut hidden = |tenths: i64| {
+        comes.centre_m[1] -= 0.7;
+        watcher.watch(&Situation {
+            time: Time::from_micros(NOW.micros() + 100_000 * tenths),
+            ..situation(std::slice::from_ref(&comes))
+        });
+        watcher.advice().unwrap().users[0].on
+    };
+    let before = hidden(0);
+    let after = hidden(1);
+    assert!(
+        (after.along_m - before.along_m - 0.7).abs() < 0.01,
+        "{after:?}"
+    );
+    // Three seconds later straight on would have led across the circle.
+    let on = (2..30).map(&mut hidden).last().unwrap();
+    assert_eq!(on.place, Place::Ring(0));
+    assert!(on.probability > 0.9, "{on:?}");
 }
 
 /// Who has only just been seen may be faster than he seems.
 #[test]
 fn nothing_is_taken_for_granted_of_newcomers() {
     let mut watcher = watcher();
-    let mut newcomer = round(Class::Car, ROAD_M, 180.0, 1.0);
-    newcomer.first_seen = NOW;
-    watcher.watch(&situation(&[newcomer]));
+    let newcomer = [round(Class::Car, ROAD_M, 180.0, 3.0)];
+    watcher.watch(&situation(&newcomer));
     let arm = own_arm(&watcher);
     assert!(!arm.entry.may_go && arm.entry.gap_s < 3.5, "{arm:?}");
+    let mut watcher = known(&newcomer);
+    watcher.watch(&situation(&newcomer));
+    let arm = own_arm(&watcher);
+    assert!(arm.entry.gap_s > 4.5, "{arm:?}");
 }
 
 #[test]

@@ -49,6 +49,12 @@ pub(super) const ALL: &[Scenario] = &[
         roads: Some(traffic::two_lane_roads),
     },
     Scenario {
+        name: "mini-traffic",
+        summary: "the same, a mini roundabout with an outer diameter of 18 m, without cyclists",
+        build: traffic::mini,
+        roads: Some(traffic::mini_roads),
+    },
+    Scenario {
         name: "roundabout-entry",
         summary: "the small roundabout with traffic; the vehicle comes from 60 m before it, and stands before it",
         build: traffic::small_entry,
@@ -59,6 +65,12 @@ pub(super) const ALL: &[Scenario] = &[
         summary: "the same at the one with two lanes",
         build: traffic::two_lane_entry,
         roads: Some(traffic::two_lane_roads),
+    },
+    Scenario {
+        name: "mini-entry",
+        summary: "the same at the mini roundabout",
+        build: traffic::mini_entry,
+        roads: Some(traffic::mini_roads),
     },
     Scenario {
         name: "street",

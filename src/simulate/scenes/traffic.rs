@@ -13,6 +13,7 @@ use crate::simulate::terrain::Terrain;
 /// The vehicle stands at the origin, before the cycle path, and looks north.
 const SMALL_CENTRE_M: [f64; 2] = [-LANE_M, 21.0];
 const TWO_LANE_CENTRE_M: [f64; 2] = [-LANE_M, 27.0];
+const MINI_CENTRE_M: [f64; 2] = [-LANE_M, 16.0];
 const EGO_DEG: f64 = 90.0;
 
 const SMALL: Passage = Passage {
@@ -45,6 +46,20 @@ const TWO_LANE_CIRCLES: [Circle; 4] = [
     Circle::pavement(25.2, 27.8),
 ];
 
+/// One drives over its middle if one must.
+const MINI: Passage = Passage {
+    centre_m: MINI_CENTRE_M,
+    radius_m: 6.5,
+    bend_m: 9.0,
+    lane_m: LANE_M,
+};
+
+const MINI_CIRCLES: [Circle; 2] = [Circle::road(3.2, 9.0), Circle::pavement(10.4, 12.6)];
+
+pub(super) fn mini_roads() -> Roadmap {
+    roads("mini-traffic", &[MINI], &MINI_CIRCLES)
+}
+
 pub(super) fn small_roads() -> Roadmap {
     roads("roundabout-traffic", &[SMALL], &SMALL_CIRCLES)
 }
@@ -61,11 +76,19 @@ const APPROACH_MPS: f64 = 8.0;
 const APART_M: f64 = 7.0;
 
 pub(super) fn small(random: &mut Random) -> Scene {
-    scene(random, &[SMALL], 16.6, 20.5, 9)
+    scene(random, &[SMALL], Some(16.6), 20.5, 9)
 }
 
 pub(super) fn two_lane(random: &mut Random) -> Scene {
-    scene(random, &TWO_LANE, 22.6, 26.5, 13)
+    scene(random, &TWO_LANE, Some(22.6), 26.5, 13)
+}
+
+pub(super) fn mini(random: &mut Random) -> Scene {
+    scene(random, &[MINI], None, 11.5, 8)
+}
+
+pub(super) fn mini_entry(random: &mut Random) -> Scene {
+    entering(mini(random), &MINI, random)
 }
 
 pub(super) fn small_entry(random: &mut Random) -> Scene {
@@ -104,7 +127,7 @@ fn entering(scene: Scene, passage: &Passage, random: &mut Random) -> Scene {
 fn scene(
     random: &mut Random,
     passages: &[Passage],
-    bikeway_m: f64,
+    bikeway_m: Option<f64>,
     pavement_m: f64,
     cars: usize,
 ) -> Scene {
@@ -112,7 +135,7 @@ fn scene(
     let ego = Path::parked([0.0; 2], EGO_DEG);
     let centre_m = outermost.centre_m;
     let mut actors: Vec<Actor> = vec![];
-    for _ in 0..2 {
+    for bikeway_m in bikeway_m.into_iter().flat_map(|radius_m| [radius_m; 2]) {
         let start_deg = 360.0 * random.uniform();
         let ride = Path::circle(centre_m, bikeway_m, start_deg, 4.17 * about(random, 0.15));
         admit(
@@ -211,11 +234,13 @@ fn scenery(random: &mut Random, passage: &Passage, pavement_m: f64) -> Scenery {
             island_m
         },
     );
-    scenery.bush(
-        passage.centre_m,
-        1.5 + 2.0 * random.uniform(),
-        0.5 + 0.8 * random.uniform(),
-    );
+    if island_m > 3.0 {
+        scenery.bush(
+            passage.centre_m,
+            1.5 + 2.0 * random.uniform(),
+            0.5 + 0.8 * random.uniform(),
+        );
+    }
     for (east, north) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
         let [x, y] = passage.centre_m;
         let corner = |far_m: f64| [x + east * far_m, y + north * far_m];

@@ -1,0 +1,369 @@
+//! Where somebody may be who is not seen.
+//!
+//! Numbers without another source were set with `scripts/evaluate-roundabouts --seeds 1-8`.
+
+use std::f64::consts::TAU;
+
+use super::gap::{User, Users};
+use super::sight::Sight;
+use super::site::{Conflict, Site};
+use crate::roadmap::{LaneKind, Polyline};
+use crate::track::Object;
+
+/// Who is listed within this of a place is who is there.
+const LISTED_M: f64 = 3.5;
+/// What is on a ring is within this share of its width: beside it kerbs, signs and bushes begin.
+const ON_RING: f64 = 0.8;
+/// Nobody on a cycle path or on foot comes faster out of where nothing is seen.
+const CYCLIST_MPS: f64 = 6.0;
+const WALKER_MPS: f64 = 2.0;
+
+/// Places on a lane, as far apart as this.
+const APART_M: f64 = 2.0;
+/// Ways in are looked at so far back: as far as one comes in the time that it takes to enter, and in the margin.
+const BACK_M: f64 = 50.0;
+
+/// Somebody was somewhere until as many looks as this say that nobody is: far away not every revolution meets him.
+const LOOKS: u8 = 5;
+
+/// Where on the rings and the ways in somebody may be who is not listed: what is hidden now and was not seen to be
+/// free before, what was reached from there meanwhile, where a road user was who is not listed any more, and where
+/// something is on a ring that is not listed.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Unseen {
+    rings: Vec<Stretch>,
+    /// Of all ways in, arm by arm.
+    ways: Vec<Stretch>,
+    /// Who was listed last: id, place, and how far around it is his.
+    listed: Vec<(u32, [f64; 2], f64)>,
+    /// Who was listed then and is not now.
+    missing: Vec<([f64; 2], f64)>,
+}
+
+/// Of one lane.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Stretch {
+    /// Of a ring from east on, in the direction of driving; of a way in from the circle back: how many looks are to come
+    /// before nobody can be there.
+    may_hold: Vec<u8>,
+    /// How far they may have gone since the last step.
+    gone_m: f64,
+}
+
+impl Unseen {
+    /// Takes in what is seen `passed_s` later.
+    pub(super) fn update(
+        &mut self,
+        site: &Site,
+        sight: &Sight<'_>,
+        objects: &[Object],
+        passed_s: f64,
+        road_mps: f64,
+    ) {
+        self.note_missing(objects);
+        let look = Look {
+            sight,
+            objects,
+            missing: &self.missing,
+        };
+        self.rings.resize_with(site.rings.len(), Stretch::default);
+        self.ways.resize_with(ways(site).count(), Stretch::default);
+        for ((_, way), stretch) in ways(site).zip(&mut self.ways) {
+            let length_m = way.length_m();
+            stretch.fit((length_m.min(BACK_M) / APART_M) as usize);
+            for _ in 0..stretch.steps(passed_s, road_mps) {
+                stretch.come_in();
+            }
+            stretch.take(&look, |place| way.at(length_m - APART_M * place as f64).0);
+        }
+        for (index, (ring, stretch)) in site.rings.iter().zip(&mut self.rings).enumerate() {
+            let count = libm::ceil(TAU * ring.circle.radius_m / APART_M).clamp(8.0, 400.0) as usize;
+            stretch.fit(count);
+            for _ in 0..stretch.steps(passed_s, fastest_mps(ring.kind, road_mps)) {
+                stretch.go_round(ring.kind == LaneKind::Pavement);
+            }
+            if site.outermost_road() == Some(index) {
+                for ((_, way), before) in ways(site).zip(&self.ways) {
+                    let mouth = place_at(site, way.at(way.length_m()).0, count);
+                    let comes = before.may_hold.first().copied().unwrap_or(0);
+                    stretch.may_hold[mouth] = stretch.may_hold[mouth].max(comes);
+                }
+            }
+            stretch.take(&look, |place| ring.circle.at(angle_rad(site, place, count)));
+        }
+        for at_m in sight.things_m() {
+            for (ring, stretch) in site.rings.iter().zip(&mut self.rings) {
+                let is_on = ring.circle.off_m(at_m).abs() < ON_RING * ring.width_m / 2.0;
+                if is_on && !is_listed(objects, at_m) {
+                    let place = place_at(site, at_m, stretch.may_hold.len());
+                    stretch.may_hold[place] = LOOKS;
+                }
+            }
+        }
+    }
+
+    /// Who has gone from the list since the last revolution.
+    fn note_missing(&mut self, objects: &[Object]) {
+        let is_missing = |id: u32| objects.iter().all(|object| object.id != id);
+        let missing = self.listed.iter().filter(|(id, ..)| is_missing(*id));
+        self.missing.clear();
+        self.missing
+            .extend(missing.map(|&(_, at_m, reach_m)| (at_m, reach_m)));
+    }
+
+    /// Remembers who is listed, and where on the lanes.
+    pub(super) fn note_listed(&mut self, site: &Site, users: Users<'_>) {
+        self.listed.clear();
+        self.listed
+            .extend(users.iter().map(|User { object, lanes }| {
+                let [x, y, _] = object.centre_m;
+                let on_lane_m = lanes.first().and_then(|on| on.place_m(site));
+                let reach_m = object.length_m / 2.0 + 1.0;
+                (object.id, on_lane_m.unwrap_or([x, y]), reach_m)
+            }));
+    }
+
+    /// How long it takes from the nearest place where somebody may be who is not listed to a conflict point of an arm, if
+    /// there is one; and the share of the rings where nobody is.
+    pub(super) fn before(
+        &self,
+        site: &Site,
+        arm: usize,
+        conflict: &Conflict,
+        road_mps: f64,
+    ) -> (f64, f64) {
+        let mut soonest_s = f64::INFINITY;
+        let mut least_share: f64 = 1.0;
+        // Who comes round an inner lane counts, too.
+        let rings = site.rings.iter().zip(&self.rings);
+        for (ring, stretch) in rings.filter(|(ring, _)| ring.kind == conflict.kind) {
+            let count = stretch.may_hold.len();
+            let hidden = (0..count).filter(|&place| stretch.may_hold[place] > 0);
+            let way_m = |place: usize| {
+                let round_rad = site.round_rad(angle_rad(site, place, count), conflict.angle_rad);
+                let back_rad = if ring.kind == LaneKind::Pavement {
+                    TAU - round_rad
+                } else {
+                    TAU
+                };
+                ring.circle.radius_m * round_rad.min(back_rad)
+            };
+            let nearest_m = hidden.clone().map(way_m).fold(f64::INFINITY, f64::min);
+            soonest_s = soonest_s.min(nearest_m / fastest_mps(ring.kind, road_mps));
+            least_share = least_share.min(1.0 - hidden.count() as f64 / count.max(1) as f64);
+        }
+        if conflict.kind == LaneKind::Road {
+            let others = ways(site).zip(&self.ways);
+            for ((_, way), stretch) in others.filter(|((other, _), _)| *other != arm) {
+                let nearest = stretch.may_hold.iter().position(|&looks| looks > 0);
+                let back_m = nearest.map_or(f64::INFINITY, |place| APART_M * place as f64);
+                let met_rad = site.angle_rad(way.at(way.length_m()).0);
+                let round_rad = site.round_rad(met_rad, conflict.angle_rad);
+                let way_m = back_m + site.rings[conflict.ring].circle.radius_m * round_rad;
+                soonest_s = soonest_s.min(way_m / road_mps);
+            }
+        }
+        (soonest_s, least_share)
+    }
+}
+
+/// All ways in with the numbers of their arms, arm by arm.
+fn ways(site: &Site) -> impl Iterator<Item = (usize, &Polyline)> {
+    let arms = site.arms.iter().enumerate();
+    arms.flat_map(|(number, arm)| arm.entries.iter().map(move |entry| (number, &entry.way)))
+}
+
+fn is_listed(objects: &[Object], at_m: [f64; 2]) -> bool {
+    objects.iter().any(|object| {
+        let [x, y, _] = object.centre_m;
+        let reach_m = LISTED_M.max(object.length_m / 2.0 + 1.0);
+        libm::hypot(x - at_m[0], y - at_m[1]) < reach_m
+    })
+}
+
+impl Stretch {
+    /// Of another number of places nothing is known.
+    fn fit(&mut self, count: usize) {
+        if self.may_hold.len() != count {
+            self.may_hold.clear();
+            self.may_hold.resize(count, 1);
+        }
+    }
+
+    /// How many places further those may be who were hidden.
+    fn steps(&mut self, passed_s: f64, fastest_mps: f64) -> usize {
+        self.gone_m += passed_s.clamp(0.0, 10.0) * fastest_mps;
+        let steps = libm::floor(self.gone_m / APART_M);
+        self.gone_m -= steps * APART_M;
+        steps as usize
+    }
+
+    /// One place nearer to the circle.
+    fn come_in(&mut self) {
+        for place in 1..self.may_hold.len() {
+            self.may_hold[place - 1] = self.may_hold[place - 1].max(self.may_hold[place]);
+        }
+    }
+
+    /// One place further round; on foot one goes both ways.
+    fn go_round(&mut self, both_ways: bool) {
+        let (Some(&first), Some(&last)) = (self.may_hold.first(), self.may_hold.last()) else {
+            return;
+        };
+        let count = self.may_hold.len();
+        for place in (1..count).rev() {
+            self.may_hold[place] = self.may_hold[place].max(self.may_hold[place - 1]);
+        }
+        self.may_hold[0] = first.max(last);
+        if both_ways {
+            // What came forward came from here: nobody goes two places back.
+            for place in 0..count - 1 {
+                self.may_hold[place] = self.may_hold[place].max(self.may_hold[place + 1]);
+            }
+            self.may_hold[count - 1] = self.may_hold[count - 1].max(first);
+        }
+    }
+
+    /// Takes in what is seen of its places.
+    fn take(&mut self, look: &Look<'_>, place_m: impl Fn(usize) -> [f64; 2]) {
+        for (place, may_hold) in self.may_hold.iter_mut().enumerate() {
+            let at_m = place_m(place);
+            let is_listed = is_listed(look.objects, at_m);
+            *may_hold = match (look.sight.reaches(at_m), is_listed) {
+                (true, true) => 0,
+                (true, false) => may_hold.saturating_sub(1),
+                // Should he not be listed any more, he is still there.
+                (false, true) => (*may_hold).max(1),
+                (false, false) => *may_hold,
+            };
+            if !is_listed && look.is_missed(at_m) {
+                *may_hold = LOOKS;
+            }
+        }
+    }
+}
+
+/// What a revolution tells of the lanes.
+struct Look<'a> {
+    sight: &'a Sight<'a>,
+    objects: &'a [Object],
+    missing: &'a [([f64; 2], f64)],
+}
+
+impl Look<'_> {
+    /// Whether somebody was there who is not listed any more.
+    fn is_missed(&self, at_m: [f64; 2]) -> bool {
+        let mut missing = self.missing.iter();
+        missing.any(|&([x, y], reach_m)| libm::hypot(x - at_m[0], y - at_m[1]) < reach_m)
+    }
+}
+
+pub(super) fn fastest_mps(kind: LaneKind, road_mps: f64) -> f64 {
+    match kind {
+        LaneKind::Road => road_mps,
+        LaneKind::Bikeway => CYCLIST_MPS,
+        LaneKind::Pavement => WALKER_MPS,
+    }
+}
+
+fn angle_rad(site: &Site, place: usize, count: usize) -> f64 {
+    let side = if site.is_clockwise { -1.0 } else { 1.0 };
+    side * TAU * place as f64 / count as f64
+}
+
+/// The place on a ring of so many places that is nearest to one of the local frame.
+fn place_at(site: &Site, at_m: [f64; 2], count: usize) -> usize {
+    let round_rad = site.round_rad(0.0, site.angle_rad(at_m));
+    let place = (round_rad / TAU * count as f64) as usize;
+    place.min(count - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parameter::Profile;
+    use crate::roundabout::{RoundaboutParameters, Situation, Watcher};
+    use crate::simulate::scenario;
+    use crate::time::Time;
+
+    fn site() -> Site {
+        let roads = scenario::find("roundabout-traffic").unwrap().roads();
+        let mut watcher = Watcher::new(&RoundaboutParameters::profile(Profile::Default));
+        watcher.take_map(&roads.unwrap());
+        watcher.place(&Situation {
+            time: Time::from_micros(1),
+            reference: None,
+            epoch: 0,
+            vehicle: None,
+            vehicle_speed_mps: 0.0,
+            objects: &[],
+            sight: None,
+        });
+        watcher.sites.remove(0)
+    }
+
+    /// All is seen to be free.
+    fn free(site: &Site) -> Unseen {
+        let stretch = |count| Stretch {
+            may_hold: vec![0; count],
+            gone_m: 0.0,
+        };
+        Unseen {
+            rings: site.rings.iter().map(|_| stretch(40)).collect(),
+            ways: ways(site).map(|_| stretch(25)).collect(),
+            ..Unseen::default()
+        }
+    }
+
+    #[test]
+    fn who_may_come_along_another_way_in_may_come_from_there() {
+        let site = site();
+        let conflict = *site.arms[0].entries[0].conflicts.last().unwrap();
+        let mut unseen = free(&site);
+        let before = |unseen: &Unseen| unseen.before(&site, 0, &conflict, 8.0);
+        assert_eq!(before(&unseen), (f64::INFINITY, 1.0));
+        // The own way in leads nobody across the own way.
+        unseen.ways[0].may_hold[3] = 1;
+        assert_eq!(before(&unseen).0, f64::INFINITY);
+        let soonest_s = (1..4).map(|other| {
+            let mut unseen = free(&site);
+            unseen.ways[other].may_hold[10] = 1;
+            before(&unseen).0
+        });
+        let mut soonest_s: Vec<f64> = soonest_s.collect();
+        soonest_s.sort_by(f64::total_cmp);
+        // Ten places back, and a quarter of the circle from arm to arm, of a radius of 11 m.
+        let quarter_s = 11.0 * TAU / 4.0 / 8.0;
+        for (quarters, said_s) in (1..4).zip(soonest_s) {
+            let due_s = 10.0 * APART_M / 8.0 + f64::from(quarters) * quarter_s;
+            assert!((said_s - due_s).abs() < 0.2, "{said_s} {due_s}");
+        }
+    }
+
+    #[test]
+    fn who_was_hidden_moves_on_as_fast_as_anybody_may() {
+        let mut stretch = Stretch {
+            may_hold: vec![0, 0, 0, 0, 1],
+            gone_m: 0.0,
+        };
+        assert_eq!(stretch.steps(0.1, 8.0), 0);
+        assert_eq!(stretch.steps(0.4, 8.0), 2);
+        stretch.come_in();
+        assert_eq!(stretch.may_hold, [0, 0, 0, 1, 1]);
+        stretch.go_round(false);
+        assert_eq!(stretch.may_hold, [1, 0, 0, 1, 1]);
+        stretch.may_hold = vec![0, 0, 5, 0, 0];
+        stretch.go_round(true);
+        assert_eq!(stretch.may_hold, [0, 5, 5, 5, 0]);
+    }
+
+    #[test]
+    fn who_goes_from_the_list_is_missed_where_he_was() {
+        let mut unseen = Unseen {
+            listed: vec![(7, [1.0, 2.0], 3.0)],
+            ..Unseen::default()
+        };
+        unseen.note_missing(&[]);
+        assert_eq!(unseen.missing, [([1.0, 2.0], 3.0)]);
+    }
+}
