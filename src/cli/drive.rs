@@ -4,13 +4,15 @@
 mod driver;
 mod judge;
 
+use std::path::PathBuf;
+
 use anyhow::{Result, bail};
 use clap::Args;
 
 use super::Completion;
+use super::files;
 use super::score::TrueUser;
 use super::simulate;
-use crate::config::Configuration;
 use crate::ego::Pose;
 use crate::ego::geodesy::Geodetic;
 use crate::pipeline::Pipeline;
@@ -34,13 +36,16 @@ pub(super) struct Arguments {
     /// How long at most, in seconds.
     #[arg(long, value_name = "S", default_value_t = 60.0, value_parser = simulate::duration)]
     duration: f64,
+    /// Configuration file; `kreisel config` prints one.
+    #[arg(long, value_name = "FILE.toml")]
+    config: Option<PathBuf>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Completion> {
     let Some(roads) = arguments.scenario.roads() else {
         bail!("there is no roundabout in {}", arguments.scenario.name);
     };
-    let configuration = Configuration::default();
+    let configuration = files::configuration(arguments.config.as_deref())?;
     let drive = |eyes: Eyes| drive(arguments, &configuration.roundabout, eyes);
     let mut pipeline = Pipeline::new(&configuration, 0);
     pipeline.take_map(&roads);

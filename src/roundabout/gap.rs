@@ -315,8 +315,8 @@ impl Approach {
         })
     }
 
-    /// As early as he may come, if he goes on as in the mean of the last moments: far away his speed now is known to
-    /// 6 %, its mean to 4 (`scripts/evaluate-roundabouts --seeds 1-30`).
+    /// As early as he may come, if he goes on as in the mean of the last moments, which is known better than his speed
+    /// now.
     fn begin_s(&self, object: &Object, front_m: f64) -> f64 {
         let [_, mean_mps] = self.speeds_mps;
         let deviations = if object.measured {

@@ -40,6 +40,29 @@ fn who_drives_round_makes_a_roundabout() {
 }
 
 #[test]
+fn where_one_drives_on_the_left_it_is_driven_round_clockwise() {
+    let mut watcher = Watcher::new(&RoundaboutParameters::profile(Profile::Default));
+    for (id, turn_deg) in [(1, 180.0), (2, 250.0), (3, 180.0)] {
+        for step in 0..60 {
+            let angle_deg = -90.0 + turn_deg * f64::from(step) / 60.0;
+            let mut car = round(Class::Car, ROAD_M, angle_deg, 6.0);
+            car.id = id;
+            // As in a mirror.
+            car.centre_m[0] = 2.0 * CENTRE_M[0] - car.centre_m[0];
+            car.yaw_rad = crate::ego::wrapped_rad(PI - car.yaw_rad);
+            car.yaw_rate_radps = -car.yaw_rate_radps;
+            watcher.watch(&situation(&[car]));
+        }
+    }
+    watcher.watch(&situation(&[]));
+    let [found] = watcher.found() else {
+        panic!("{:?}", watcher.found());
+    };
+    assert!(found.roundabout.is_clockwise);
+    assert!((found.roundabout.rings[0].circle.radius_m - ROAD_M).abs() < 0.1);
+}
+
+#[test]
 fn what_a_map_knows_is_not_found_again() {
     let mut watcher = watcher();
     drive_past(&mut watcher, CENTRE_M);
