@@ -42,8 +42,13 @@ pub struct OnLane {
 
 impl OnLane {
     /// So much further along the lane: from a way in onto the circle.
-    fn moved_on(self, site: &Site, gone_m: f64) -> Self {
-        let along_m = self.along_m + gone_m;
+    pub(super) fn moved_on(self, site: &Site, gone_m: f64) -> Self {
+        // Angles count counter-clockwise, whichever way one drives.
+        let side = if site.is_clockwise { -1.0 } else { 1.0 };
+        let along_m = match self.place {
+            Place::Ring(_) => self.along_m + side * gone_m,
+            _ => self.along_m + gone_m,
+        };
         let (Place::Entry(arm, lane), Some(road)) = (self.place, site.outermost_road()) else {
             return Self { along_m, ..self };
         };
@@ -52,7 +57,6 @@ impl OnLane {
         if past_m < 0.0 {
             return Self { along_m, ..self };
         }
-        let side = if site.is_clockwise { -1.0 } else { 1.0 };
         let radius_m = site.rings[road].circle.radius_m;
         let met_rad = site.angle_rad(way.at(way.length_m()).0);
         Self {
@@ -194,18 +198,18 @@ impl Belief {
         candidates: &mut Vec<Candidate>,
         found: &mut Vec<OnLane>,
     ) {
+        self.known_s += passed_s;
         if !object.measured && !self.last.is_empty() {
             // Who is hidden goes on along his lane, wherever straight on would lead.
             for on in &mut self.last {
                 *on = on.moved_on(site, on.mean_speed_mps * passed_s);
-                on.known_s += passed_s;
+                on.known_s = self.known_s;
             }
             found.clone_from(&self.last);
             return;
         }
         take_candidates(site, object, candidates);
         let (_, speed_mps) = course(object);
-        self.known_s += passed_s;
         // It takes a while before the tracker knows the speed of who is new.
         let settled = self.mean_speed_mps.filter(|_| self.known_s >= NEW_S);
         let mean_mps = settled.unwrap_or(speed_mps);

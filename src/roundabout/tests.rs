@@ -257,6 +257,21 @@ fn who_is_hidden_goes_on_along_his_lane() {
     assert!(on.probability > 0.9, "{on:?}");
 }
 
+#[test]
+fn who_is_hidden_goes_round_as_one_drives_there() {
+    let comes = round(Class::Car, ROAD_M, 90.0, 7.0);
+    let mut watcher = known(std::slice::from_ref(&comes));
+    let on = watcher.advice().unwrap().users[0].on;
+    let site = &mut watcher.sites[0];
+    let counter_clockwise_m = on.moved_on(site, 2.0).along_m;
+    site.is_clockwise = true;
+    let clockwise_m = on.moved_on(site, 2.0).along_m;
+    assert_eq!(
+        [counter_clockwise_m - on.along_m, clockwise_m - on.along_m],
+        [2.0, -2.0]
+    );
+}
+
 /// Who has only just been seen may be faster than he seems.
 #[test]
 fn nothing_is_taken_for_granted_of_newcomers() {
