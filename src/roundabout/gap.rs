@@ -253,7 +253,7 @@ struct Approach {
     fastest_mps: f64,
     /// Whether he is on the circle already.
     on_circle: bool,
-    /// For how long he has been known.
+    /// For how long he has been seen since he is listed.
     known_s: f64,
     /// That he comes so.
     probability: f64,

@@ -36,7 +36,7 @@ pub struct OnLane {
     pub speed_mps: f64,
     /// The same in the mean of the last moments.
     pub mean_speed_mps: f64,
-    /// For how long somebody has been watched without a break.
+    /// For how long somebody has been seen since he is listed.
     pub known_s: f64,
 }
 
@@ -87,7 +87,7 @@ pub(super) struct Belief {
     lanes: Vec<(Place, f64)>,
     /// In the mean of the last moments, if he was seen before.
     mean_speed_mps: Option<f64>,
-    /// For how long he has been known.
+    /// For how long he has been seen.
     known_s: f64,
     /// Where he most likely was when he was measured last, moved on since.
     last: Vec<OnLane>,
@@ -198,18 +198,17 @@ impl Belief {
         candidates: &mut Vec<Candidate>,
         found: &mut Vec<OnLane>,
     ) {
-        self.known_s += passed_s;
         if !object.measured && !self.last.is_empty() {
             // Who is hidden goes on along his lane, wherever straight on would lead.
             for on in &mut self.last {
                 *on = on.moved_on(site, on.mean_speed_mps * passed_s);
-                on.known_s = self.known_s;
             }
             found.clone_from(&self.last);
             return;
         }
         take_candidates(site, object, candidates);
         let (_, speed_mps) = course(object);
+        self.known_s += passed_s;
         // It takes a while before the tracker knows the speed of who is new.
         let settled = self.mean_speed_mps.filter(|_| self.known_s >= NEW_S);
         let mean_mps = settled.unwrap_or(speed_mps);
