@@ -1,7 +1,7 @@
 //! What is said of a roundabout, and of each arm.
 
 use super::gap::{self, Asked, OwnMotion, User};
-use super::lanes::{OnLane, Place};
+use super::on_lane::{OnLane, Place};
 use super::unseen::Unseen;
 use super::{RoundaboutParameters, Window};
 use crate::roadmap::Ring;

@@ -5,7 +5,8 @@
 use std::f64::consts::TAU;
 
 use super::RoundaboutParameters;
-use super::lanes::{OnLane, Place, STAYS};
+use super::lanes::STAYS;
+use super::on_lane::{NEW_S, OnLane, Place};
 use super::site::{Conflict, Site};
 use super::unseen::fastest_mps;
 use crate::roadmap::LaneKind;
@@ -76,8 +77,6 @@ const LEAST_SEEN_PROBABILITY: f64 = 0.02;
 const WAITS_MPS: f64 = 0.7;
 /// Who goes along a pavement with less than this share of his speed goes across it.
 const ALONG_SHARE: f64 = 0.7;
-/// Who was first seen so lately may be faster than he seems, and go another way.
-pub(super) const NEW_S: f64 = 1.0;
 /// Time that a road user must have been gone before the vehicle comes.
 pub(super) const BEHIND_S: f64 = 0.3;
 /// Standard deviations that a window is widened by at either end.
@@ -222,12 +221,11 @@ fn way_to(
             Some((way_m, libm::pow(STAYS, f64::from(exits))))
         }
         Place::Entry(other, lane) if conflict.kind == LaneKind::Road && other != arm => {
-            let way = &site.arms[other].entries[lane].way;
-            let met_rad = site.angle_rad(way.at(way.length_m()).0);
-            let round_rad = site.round_rad(met_rad, conflict.angle_rad);
-            let exits = exits_between(site, met_rad, round_rad);
+            let entry = &site.arms[other].entries[lane];
+            let round_rad = site.round_rad(entry.mouth_rad, conflict.angle_rad);
+            let exits = exits_between(site, entry.mouth_rad, round_rad);
             let radius_m = site.rings[conflict.ring].circle.radius_m;
-            let way_m = way.length_m() - on.along_m + radius_m * round_rad;
+            let way_m = entry.way.length_m() - on.along_m + radius_m * round_rad;
             Some((way_m, libm::pow(STAYS, f64::from(exits))))
         }
         _ => None,
@@ -287,9 +285,9 @@ impl Approach {
         let [now_mps, mean_mps] = self.speeds_mps;
         let half_m = object.length_m / 2.0 + self.zone_m;
         let (front_m, rear_m) = (self.way_m - half_m, self.way_m + half_m);
-        let fastest_mps = now_mps.max(mean_mps);
+        let faster_mps = now_mps.max(mean_mps);
         let stands =
-            fastest_mps + 2.0 * object.speed_deviation_mps < WAITS_MPS && self.known_s >= NEW_S;
+            faster_mps + 2.0 * object.speed_deviation_mps < WAITS_MPS && self.known_s >= NEW_S;
         let is_there = front_m <= 0.0 && rear_m >= 0.0;
         let [begin_s, end_s] = if stands && self.on_circle && self.way_m > 0.0 {
             [self.begin_s(object, front_m), HORIZON_S]

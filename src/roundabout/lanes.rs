@@ -2,84 +2,11 @@
 //!
 //! Numbers without another source were set with `scripts/evaluate-roundabouts --seeds 1-8`.
 
-use super::gap::NEW_S;
+use super::on_lane::{NEW_S, OnLane, Place};
 use super::site::Site;
 use crate::ego::wrapped_rad;
 use crate::roadmap::{LaneKind, Polyline};
 use crate::track::{Class, Object};
-
-/// A lane of the site.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Place {
-    /// On a ring of this number.
-    Ring(usize),
-    /// On the way in of an arm: arm, lane.
-    Entry(usize, usize),
-    /// On the way out of an arm: arm, lane.
-    Exit(usize, usize),
-    /// On none.
-    Elsewhere,
-}
-
-/// Where on a lane somebody is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OnLane {
-    /// The lane.
-    pub place: Place,
-    /// Probability that it is this one.
-    pub probability: f64,
-    /// Along it: on a ring from east, counter-clockwise; on a way from its beginning.
-    pub along_m: f64,
-    /// To the left of its middle positive; on a ring, outward.
-    pub offset_m: f64,
-    /// Along it positive: speed as far as it leads along the lane.
-    pub speed_mps: f64,
-    /// The same in the mean of the last moments.
-    pub mean_speed_mps: f64,
-    /// For how long somebody has been seen since he is listed.
-    pub known_s: f64,
-}
-
-impl OnLane {
-    /// So much further along the lane: from a way in onto the circle.
-    pub(super) fn moved_on(self, site: &Site, gone_m: f64) -> Self {
-        // Angles count counter-clockwise, whichever way one drives.
-        let side = if site.is_clockwise { -1.0 } else { 1.0 };
-        let along_m = match self.place {
-            Place::Ring(_) => self.along_m + side * gone_m,
-            _ => self.along_m + gone_m,
-        };
-        let (Place::Entry(arm, lane), Some(road)) = (self.place, site.outermost_road()) else {
-            return Self { along_m, ..self };
-        };
-        let way = &site.arms[arm].entries[lane].way;
-        let past_m = along_m - way.length_m();
-        if past_m < 0.0 {
-            return Self { along_m, ..self };
-        }
-        let radius_m = site.rings[road].circle.radius_m;
-        let met_rad = site.angle_rad(way.at(way.length_m()).0);
-        Self {
-            place: Place::Ring(road),
-            along_m: radius_m * met_rad + side * past_m,
-            ..self
-        }
-    }
-
-    /// Where that is in the local frame; nowhere on none.
-    pub(super) fn place_m(&self, site: &Site) -> Option<[f64; 2]> {
-        let on_way = |way: &Polyline| way.at(self.along_m).0;
-        match self.place {
-            Place::Ring(ring) => {
-                let circle = site.rings[ring].circle;
-                Some(circle.at(self.along_m / circle.radius_m))
-            }
-            Place::Entry(arm, lane) => Some(on_way(&site.arms[arm].entries[lane].way)),
-            Place::Exit(arm, lane) => Some(on_way(&site.arms[arm].exits[lane].way)),
-            Place::Elsewhere => None,
-        }
-    }
-}
 
 /// What the filter remembers of a road user: lanes with their probabilities.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -281,8 +208,7 @@ fn take_candidates(site: &Site, object: &Object, found: &mut Vec<Candidate>) {
     found.push(Candidate::new(nowhere, ELSEWHERE));
     found.extend((0..site.rings.len()).filter_map(|ring| on_ring(site, ring, object)));
     let outermost = site.outermost_road().map(|ring| &site.rings[ring].circle);
-    let side = if site.is_clockwise { -1.0 } else { 1.0 };
-    let round_per_m = outermost.map_or(0.0, |circle| side / circle.radius_m);
+    let round_per_m = outermost.map_or(0.0, |circle| site.side() / circle.radius_m);
     for (arm, ways) in site.arms.iter().enumerate() {
         for (lane, entry) in ways.entries.iter().enumerate() {
             let place = Place::Entry(arm, lane);
@@ -347,7 +273,7 @@ fn on_ring(site: &Site, index: usize, object: &Object) -> Option<Candidate> {
     }
     let angle_rad = ring.circle.angle_rad(at_m);
     let tangent_rad = site.tangent_rad(angle_rad);
-    let side = if site.is_clockwise { -1.0 } else { 1.0 };
+    let side = site.side();
     let along = motion_fit(object, tangent_rad, side / ring.circle.radius_m);
     let back_rad = wrapped_rad(tangent_rad + std::f64::consts::PI);
     // On foot one goes both ways.

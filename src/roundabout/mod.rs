@@ -9,6 +9,7 @@ mod arms;
 mod finder;
 mod gap;
 mod lanes;
+mod on_lane;
 mod own;
 mod sight;
 mod site;
@@ -28,7 +29,7 @@ use unseen::Unseen;
 
 pub use advice::{Advice, ArmAdvice, Crossing, Hindrance, State, UserOnLane};
 pub use gap::Window;
-pub use lanes::{OnLane, Place};
+pub use on_lane::{OnLane, Place};
 pub use sight::Sight;
 
 parameters! {

@@ -2,7 +2,7 @@
 
 use super::advice::State;
 use super::gap::{OwnMotion, Users};
-use super::lanes::Place;
+use super::on_lane::Place;
 use super::site::{Entry, Exit, Site};
 use super::{RoundaboutParameters, Situation};
 use crate::ego::Pose;

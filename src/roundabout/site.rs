@@ -43,6 +43,8 @@ pub(super) struct Entry {
     /// To where it meets the middle of the outermost road lane.
     pub(super) way: Polyline,
     pub(super) width_m: f64,
+    /// Where it meets the circle.
+    pub(super) mouth_rad: f64,
     /// What it crosses, in the order in which it is met.
     pub(super) conflicts: Vec<Conflict>,
 }
@@ -191,6 +193,11 @@ impl Site {
         turn_rad - TAU * libm::floor(turn_rad / TAU)
     }
 
+    /// 1 where one drives round counter-clockwise, -1 where clockwise.
+    pub(super) fn side(&self) -> f64 {
+        if self.is_clockwise { -1.0 } else { 1.0 }
+    }
+
     /// Direction in which one drives at a direction from the middle.
     pub(super) fn tangent_rad(&self, angle_rad: f64) -> f64 {
         let quarter_rad = if self.is_clockwise {
@@ -216,6 +223,7 @@ impl Site {
         conflicts.retain(|conflict| conflict.ring != road);
         conflicts.push(self.conflict(&way, road, way.length_m()));
         Some(Entry {
+            mouth_rad: self.angle_rad(*way.points_m().last()?),
             way,
             width_m,
             conflicts,

@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 
 use super::gap::{User, Users};
 use super::sight::Sight;
-use super::site::{Conflict, Site};
-use crate::roadmap::{LaneKind, Polyline};
+use super::site::{Conflict, Entry, Site};
+use crate::roadmap::LaneKind;
 use crate::track::Object;
 
 /// Who is listed within this of a place is who is there.
@@ -25,7 +25,7 @@ const BACK_M: f64 = 50.0;
 
 /// Somebody was somewhere until as many looks as this say that nobody is: far away not every revolution meets him. With
 /// one look 26 instead of 21 gaps of 1,650 at any arm, and 5 instead of 1 of 1,330 at exits, are announced that are not there
-/// (`scripts/evaluate-roundabouts --seeds 1-30`).
+/// (`scripts/evaluate-roundabouts --seeds 1-30 --scenarios roundabout-traffic,two-lane-roundabout`).
 const LOOKS: u8 = 5;
 
 /// Where on the rings and the ways in somebody may be who is not listed: what is hidden now and was not seen to be
@@ -69,8 +69,10 @@ impl Unseen {
             missing: &self.missing,
         };
         self.rings.resize_with(site.rings.len(), Stretch::default);
-        self.ways.resize_with(ways(site).count(), Stretch::default);
-        for ((_, way), stretch) in ways(site).zip(&mut self.ways) {
+        self.ways
+            .resize_with(entries(site).count(), Stretch::default);
+        for ((_, entry), stretch) in entries(site).zip(&mut self.ways) {
+            let way = &entry.way;
             let length_m = way.length_m();
             stretch.fit((length_m.min(BACK_M) / APART_M) as usize);
             for _ in 0..stretch.steps(passed_s, road_mps) {
@@ -85,8 +87,8 @@ impl Unseen {
                 stretch.go_round(ring.kind == LaneKind::Pavement);
             }
             if site.outermost_road() == Some(index) {
-                for ((_, way), before) in ways(site).zip(&self.ways) {
-                    let mouth = place_at(site, way.at(way.length_m()).0, count);
+                for ((_, entry), before) in entries(site).zip(&self.ways) {
+                    let mouth = place_at(site, entry.mouth_rad, count);
                     let comes = before.may_hold.first().copied().unwrap_or(0);
                     stretch.may_hold[mouth] = stretch.may_hold[mouth].max(comes);
                 }
@@ -97,7 +99,7 @@ impl Unseen {
             for (ring, stretch) in site.rings.iter().zip(&mut self.rings) {
                 let is_on = ring.circle.off_m(at_m).abs() < ON_RING * ring.width_m / 2.0;
                 if is_on && !is_listed(objects, at_m) {
-                    let place = place_at(site, at_m, stretch.may_hold.len());
+                    let place = place_at(site, site.angle_rad(at_m), stretch.may_hold.len());
                     stretch.may_hold[place] = LOOKS;
                 }
             }
@@ -120,8 +122,7 @@ impl Unseen {
             .extend(users.iter().map(|User { object, lanes }| {
                 let [x, y, _] = object.centre_m;
                 let on_lane_m = lanes.first().and_then(|on| on.place_m(site));
-                let reach_m = object.length_m / 2.0 + 1.0;
-                (object.id, on_lane_m.unwrap_or([x, y]), reach_m)
+                (object.id, on_lane_m.unwrap_or([x, y]), reach_m(object))
             }));
     }
 
@@ -155,12 +156,11 @@ impl Unseen {
             least_share = least_share.min(1.0 - hidden.count() as f64 / count.max(1) as f64);
         }
         if conflict.kind == LaneKind::Road {
-            let others = ways(site).zip(&self.ways);
-            for ((_, way), stretch) in others.filter(|((other, _), _)| *other != arm) {
+            let others = entries(site).zip(&self.ways);
+            for ((_, entry), stretch) in others.filter(|((other, _), _)| *other != arm) {
                 let nearest = stretch.may_hold.iter().position(|&looks| looks > 0);
                 let back_m = nearest.map_or(f64::INFINITY, |place| APART_M * place as f64);
-                let met_rad = site.angle_rad(way.at(way.length_m()).0);
-                let round_rad = site.round_rad(met_rad, conflict.angle_rad);
+                let round_rad = site.round_rad(entry.mouth_rad, conflict.angle_rad);
                 let way_m = back_m + site.rings[conflict.ring].circle.radius_m * round_rad;
                 soonest_s = soonest_s.min(way_m / road_mps);
             }
@@ -170,15 +170,20 @@ impl Unseen {
 }
 
 /// All ways in with the numbers of their arms, arm by arm.
-fn ways(site: &Site) -> impl Iterator<Item = (usize, &Polyline)> {
+fn entries(site: &Site) -> impl Iterator<Item = (usize, &Entry)> {
     let arms = site.arms.iter().enumerate();
-    arms.flat_map(|(number, arm)| arm.entries.iter().map(move |entry| (number, &entry.way)))
+    arms.flat_map(|(number, arm)| arm.entries.iter().map(move |entry| (number, entry)))
+}
+
+/// How far around his middle a place is a road user's: half of his length and a metre.
+fn reach_m(object: &Object) -> f64 {
+    object.length_m / 2.0 + 1.0
 }
 
 fn is_listed(objects: &[Object], at_m: [f64; 2]) -> bool {
     objects.iter().any(|object| {
         let [x, y, _] = object.centre_m;
-        let reach_m = LISTED_M.max(object.length_m / 2.0 + 1.0);
+        let reach_m = LISTED_M.max(reach_m(object));
         libm::hypot(x - at_m[0], y - at_m[1]) < reach_m
     })
 }
@@ -269,13 +274,12 @@ pub(super) fn fastest_mps(kind: LaneKind, road_mps: f64) -> f64 {
 }
 
 fn angle_rad(site: &Site, place: usize, count: usize) -> f64 {
-    let side = if site.is_clockwise { -1.0 } else { 1.0 };
-    side * TAU * place as f64 / count as f64
+    site.side() * TAU * place as f64 / count as f64
 }
 
-/// The place on a ring of so many places that is nearest to one of the local frame.
-fn place_at(site: &Site, at_m: [f64; 2], count: usize) -> usize {
-    let round_rad = site.round_rad(0.0, site.angle_rad(at_m));
+/// The place on a ring of so many places in a direction from the middle.
+fn place_at(site: &Site, angle_rad: f64, count: usize) -> usize {
+    let round_rad = site.round_rad(0.0, angle_rad);
     let place = (round_rad / TAU * count as f64) as usize;
     place.min(count - 1)
 }
@@ -312,7 +316,7 @@ mod tests {
         };
         Unseen {
             rings: site.rings.iter().map(|_| stretch(40)).collect(),
-            ways: ways(site).map(|_| stretch(25)).collect(),
+            ways: entries(site).map(|_| stretch(25)).collect(),
             ..Unseen::default()
         }
     }

@@ -234,6 +234,7 @@ fn scenery(random: &mut Random, passage: &Passage, pavement_m: f64) -> Scenery {
             island_m
         },
     );
+    // The middle of a mini roundabout is driven over.
     if island_m > 3.0 {
         scenery.bush(
             passage.centre_m,
