@@ -152,6 +152,7 @@ mod tests {
                 speed_mps: 1.0,
                 mean_speed_mps: 1.0,
                 known_s: 1.0,
+                came_in_by: None,
             },
         };
         let soon = Window {

@@ -1,5 +1,7 @@
 //! Ways as chains of points.
 
+use crate::ego::wrapped_rad;
+
 /// A way from point to point, without repeated ones.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Polyline {
@@ -123,6 +125,14 @@ impl Polyline {
         let [dx, dy] = self.direction(piece);
         let on_m = (along_m.clamp(0.0, self.length_m()) - self.along_m[piece]).max(0.0);
         ([x + on_m * dx, y + on_m * dy], libm::atan2(dy, dx))
+    }
+
+    /// How much it bends there, to the left positive, by the directions a little before and after.
+    pub fn curvature_per_m(&self, along_m: f64) -> f64 {
+        const STEP_M: f64 = 2.0;
+        let [(_, before_rad), (_, after_rad)] =
+            [-STEP_M, STEP_M].map(|step_m| self.at(along_m + step_m));
+        wrapped_rad(after_rad - before_rad) / (2.0 * STEP_M)
     }
 
     /// The place nearest to a point; nothing if there are not two points.

@@ -5,7 +5,8 @@
 use std::f64::consts::TAU;
 
 use super::RoundaboutParameters;
-use super::lanes::STAYS;
+use super::bend::{Bend, round_mps};
+use super::leaving::still_there;
 use super::on_lane::{NEW_S, OnLane, Place};
 use super::site::{Conflict, Site};
 use super::unseen::fastest_mps;
@@ -72,7 +73,7 @@ pub(super) const HORIZON_S: f64 = 15.0;
 /// Who comes with less than this probability is not waited for: of those who are known, and of those who are seen, as
 /// what is seen of somebody who leaves is never quite right.
 const LEAST_PROBABILITY: f64 = 0.03;
-const LEAST_SEEN_PROBABILITY: f64 = 0.02;
+const LEAST_SEEN_PROBABILITY: f64 = 0.01;
 /// Slower road users do not come: they wait.
 const WAITS_MPS: f64 = 0.7;
 /// Who goes along a pavement with less than this share of his speed goes across it.
@@ -86,6 +87,8 @@ const DEVIATIONS_HIDDEN: f64 = 1.0;
 /// Slower ones on the circle may gather speed, and so fast.
 const SLOW_MPS: f64 = 2.0;
 const STARTS_MPS2: f64 = 3.0;
+/// Drivers go round so many times as fast as most, or as slowly.
+const VARIES: f64 = 1.15;
 /// More does not count: whose place is not known at all is rather not there.
 const MOST_BLUR_M: f64 = 2.0;
 
@@ -213,30 +216,34 @@ fn way_to(
             } else {
                 behind(radius_m * round_rad, radius_m)
             };
-            let exits = if own.kind == LaneKind::Road && way_m > 0.0 {
-                exits_between(site, angle_rad, round_rad)
+            let stays = if own.kind == LaneKind::Road && way_m > 0.0 {
+                still_there(site, angle_rad, round_rad, on.came_in_by)
             } else {
-                0
+                1.0
             };
-            Some((way_m, libm::pow(STAYS, f64::from(exits))))
+            Some((way_m, stays))
         }
         Place::Entry(other, lane) if conflict.kind == LaneKind::Road && other != arm => {
             let entry = &site.arms[other].entries[lane];
             let round_rad = site.round_rad(entry.mouth_rad, conflict.angle_rad);
-            let exits = exits_between(site, entry.mouth_rad, round_rad);
+            let stays = still_there(site, entry.mouth_rad, round_rad, Some(other));
             let radius_m = site.rings[conflict.ring].circle.radius_m;
             let way_m = entry.way.length_m() - on.along_m + radius_m * round_rad;
-            Some((way_m, libm::pow(STAYS, f64::from(exits))))
+            Some((way_m, stays))
         }
         _ => None,
     }
 }
 
-/// Exits whose mouth lies ahead on the way round, up to a point.
-fn exits_between(site: &Site, angle_rad: f64, round_rad: f64) -> i32 {
-    let exits = site.arms.iter().filter_map(|arm| arm.exits.first());
-    let ahead = exits.filter(|exit| site.round_rad(angle_rad, exit.mouth_rad) < round_rad);
-    ahead.count() as i32
+/// The bend between somebody on a way in and a conflict point.
+fn bend_before(site: &Site, conflict: &Conflict, on: &OnLane) -> Option<Bend> {
+    let Place::Entry(arm, lane) = on.place else {
+        return None;
+    };
+    Some(Bend {
+        left_m: site.arms[arm].entries[lane].bend_m - on.along_m,
+        speed_mps: round_mps(site.rings[conflict.ring].circle.radius_m),
+    })
 }
 
 /// How somebody comes to a conflict point.
@@ -251,6 +258,8 @@ struct Approach {
     fastest_mps: f64,
     /// Whether he is on the circle already.
     on_circle: bool,
+    /// What he slows down for, if he is not.
+    bend: Option<Bend>,
     /// For how long he has been seen since he is listed.
     known_s: f64,
     /// That he comes so.
@@ -275,6 +284,7 @@ impl Approach {
             zone_m: asked.width_m / 2.0,
             fastest_mps: fastest_mps(conflict.kind, asked.road_mps),
             on_circle: matches!(on.place, Place::Ring(_)) && conflict.kind == LaneKind::Road,
+            bend: bend_before(asked.site, conflict, on),
             known_s: on.known_s,
             probability: probability * on.probability,
         })
@@ -295,10 +305,12 @@ impl Approach {
             // Who stands where the ways cross is in the way as long as he stands.
             is_there.then_some([0.0, HORIZON_S])?
         } else {
-            let end_s = time_s(object, rear_m, now_mps.min(mean_mps), DEVIATIONS);
+            let slower_mps = now_mps.min(mean_mps);
+            let end_s = self.time_s(object, rear_m, slower_mps, 1.0 / VARIES, DEVIATIONS);
             [self.begin_s(object, front_m), end_s]
         };
         let front_of_him_m = self.way_m - object.length_m / 2.0;
+        let expected_s = self.time_s(object, front_of_him_m, now_mps, 1.0, 0.0);
         (end_s > 0.0).then_some(Window {
             object_id: object.id,
             arm: 0,
@@ -307,7 +319,7 @@ impl Approach {
             kind: LaneKind::Road,
             begin_s,
             end_s,
-            expected_s: time_s(object, front_of_him_m, now_mps, 0.0).max(0.0),
+            expected_s: expected_s.max(0.0),
             probability: self.probability,
             way_m: self.way_m,
         })
@@ -322,7 +334,8 @@ impl Approach {
         } else {
             DEVIATIONS_HIDDEN
         };
-        let mut begin_s = time_s(object, front_m, mean_mps, -deviations).max(0.0);
+        let mut begin_s = self.time_s(object, front_m, mean_mps, VARIES, -deviations);
+        begin_s = begin_s.max(0.0);
         let left_m = front_m.max(0.0);
         // Who stands on the circle may go on.
         if self.on_circle && mean_mps < SLOW_MPS {
@@ -335,13 +348,29 @@ impl Approach {
         // However little is known of his speed.
         begin_s.max(left_m / self.fastest_mps.max(mean_mps))
     }
-}
 
-/// When somebody has gone so far, so many deviations later: it is not known where he is, and not how fast.
-fn time_s(object: &Object, way_m: f64, speed_mps: f64, deviations: f64) -> f64 {
-    let [x, y] = object.position_deviation_m;
-    let moving_mps = speed_mps.max(WAITS_MPS);
-    let wander_m = way_m.max(0.0) / moving_mps * object.speed_deviation_mps;
-    let blur_m = libm::hypot(x.max(y).min(MOST_BLUR_M), wander_m);
-    (way_m + deviations * blur_m) / moving_mps
+    /// When he has gone so far, so many deviations later: it is not known where he is, and not how fast. He goes round
+    /// `varies` times as fast as most do.
+    fn time_s(
+        &self,
+        object: &Object,
+        way_m: f64,
+        speed_mps: f64,
+        varies: f64,
+        deviations: f64,
+    ) -> f64 {
+        let [x, y] = object.position_deviation_m;
+        let moving_mps = speed_mps.max(WAITS_MPS);
+        let time_s = |way_m: f64| match self.bend {
+            Some(bend) => Bend {
+                speed_mps: varies * bend.speed_mps,
+                ..bend
+            }
+            .time_s(way_m, moving_mps),
+            None => way_m / moving_mps,
+        };
+        let wander_m = way_m.max(0.0) / moving_mps * object.speed_deviation_mps;
+        let blur_m = libm::hypot(x.max(y).min(MOST_BLUR_M), wander_m);
+        time_s(way_m + deviations * blur_m)
+    }
 }

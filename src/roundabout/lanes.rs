@@ -2,6 +2,7 @@
 //!
 //! Numbers without another source were set with `scripts/evaluate-roundabouts --seeds 1-8`.
 
+use super::leaving::takes;
 use super::on_lane::{NEW_S, OnLane, Place};
 use super::site::Site;
 use crate::ego::wrapped_rad;
@@ -16,6 +17,8 @@ pub(super) struct Belief {
     mean_speed_mps: Option<f64>,
     /// For how long he has been seen.
     known_s: f64,
+    /// Arm by which he came in, if that was seen.
+    came_in_by: Option<usize>,
     /// Where he most likely was when he was measured last, moved on since.
     last: Vec<OnLane>,
 }
@@ -36,6 +39,7 @@ impl Beliefs {
                 belief.lanes.clear();
                 belief.mean_speed_mps = None;
                 belief.known_s = 0.0;
+                belief.came_in_by = None;
                 belief.last.clear();
             }
         }
@@ -73,9 +77,6 @@ const OTHERWISE: f64 = 0.05;
 const MEAN_SHARE: f64 = 0.14;
 /// Cosine of the direction against a lane within which somebody goes along it.
 const LEADS: f64 = 0.3;
-/// Probability that one who is on the circle stays there at an exit that he is not seen to take:
-/// unknown.
-pub(super) const STAYS: f64 = 0.6;
 /// So far into an exit one may have come from the circle.
 const MOUTH_M: f64 = 6.0;
 /// Density of road users beside all lanes, in place of a lane's by place and heading.
@@ -144,9 +145,16 @@ impl Belief {
         let gone_m = speed_mps * passed_s;
         let count = candidates.len();
         for candidate in candidates.iter_mut() {
-            candidate.weight = candidate.likelihood * self.prior(&candidate.on, count, gone_m);
+            candidate.weight =
+                candidate.likelihood * self.prior(site, &candidate.on, count, gone_m);
         }
         let sum: f64 = candidates.iter().map(|candidate| candidate.weight).sum();
+        let likeliest = candidates
+            .iter()
+            .max_by(|a, b| a.weight.total_cmp(&b.weight));
+        if let Some(Place::Entry(arm, _)) = likeliest.map(|candidate| candidate.on.place) {
+            self.came_in_by = Some(arm);
+        }
         self.lanes.clear();
         found.clear();
         for candidate in candidates.iter() {
@@ -156,6 +164,7 @@ impl Belief {
                 found.push(OnLane {
                     probability,
                     known_s: self.known_s,
+                    came_in_by: self.came_in_by,
                     mean_speed_mps: if speed_mps > 0.0 {
                         mean_mps / speed_mps * candidate.on.speed_mps
                     } else {
@@ -170,7 +179,7 @@ impl Belief {
     }
 
     /// How probable a lane is before it is known where somebody is now.
-    fn prior(&self, on: &OnLane, lanes: usize, gone_m: f64) -> f64 {
+    fn prior(&self, site: &Site, on: &OnLane, lanes: usize, gone_m: f64) -> f64 {
         let fresh = 1.0 / lanes as f64;
         // Nobody knows where somebody was who was never seen.
         if self.lanes.is_empty() {
@@ -179,17 +188,17 @@ impl Belief {
         let known = self.lanes.iter().find(|(other, _)| *other == on.place);
         let kept = known.map_or(0.0, |(_, probability)| *probability);
         let stayed = (1.0 - FORGOTTEN) * kept + FORGOTTEN * fresh;
-        let is_mouth = matches!(on.place, Place::Exit(..)) && on.along_m < MOUTH_M;
-        if !is_mouth {
-            return stayed;
-        }
+        let arm = match on.place {
+            Place::Exit(arm, _) if on.along_m < MOUTH_M => arm,
+            _ => return stayed,
+        };
         let rings = self
             .lanes
             .iter()
             .filter(|(place, _)| matches!(place, Place::Ring(_)));
         let round: f64 = rings.map(|(_, probability)| probability).sum();
         // Who leaves does so somewhere along the mouth.
-        stayed + (1.0 - STAYS) * round * (gone_m / MOUTH_M).clamp(0.0, 1.0)
+        stayed + takes(site, arm, self.came_in_by) * round * (gone_m / MOUTH_M).clamp(0.0, 1.0)
     }
 }
 
@@ -204,6 +213,7 @@ fn take_candidates(site: &Site, object: &Object, found: &mut Vec<Candidate>) {
         speed_mps: object.speed_mps,
         mean_speed_mps: 0.0,
         known_s: 0.0,
+        came_in_by: None,
     };
     found.push(Candidate::new(nowhere, ELSEWHERE));
     found.extend((0..site.rings.len()).filter_map(|ring| on_ring(site, ring, object)));
@@ -302,6 +312,7 @@ fn on_ring(site: &Site, index: usize, object: &Object) -> Option<Candidate> {
         speed_mps: if is_along { leads_mps } else { -leads_mps },
         mean_speed_mps: 0.0,
         known_s: 0.0,
+        came_in_by: None,
     };
     let likelihood =
         place_fit(object, offset_m, ring.width_m) * fit * share(object.class, ring.kind);
@@ -324,7 +335,7 @@ fn on_way(
     }
     let turned = (station.along_m / TURNS_M).clamp(0.0, 1.0);
     let curvature_per_m =
-        before_per_m + turned * (curvature_per_m(way, station.along_m) - before_per_m);
+        before_per_m + turned * (way.curvature_per_m(station.along_m) - before_per_m);
     let (course_rad, speed_mps) = course(object);
     let fit = motion_fit(object, station.heading_rad, curvature_per_m);
     // Nobody goes out on a way in, and of who has only just come into view the direction is not known well.
@@ -340,16 +351,9 @@ fn on_way(
         speed_mps: speed_mps * leads,
         mean_speed_mps: 0.0,
         known_s: 0.0,
+        came_in_by: None,
     };
     let likelihood =
         place_fit(object, station.offset_m, width_m) * fit * share(object.class, LaneKind::Road);
     Some(Candidate::new(on, likelihood))
-}
-
-/// By the directions a little before and after.
-fn curvature_per_m(way: &Polyline, along_m: f64) -> f64 {
-    const STEP_M: f64 = 2.0;
-    let [(_, before_rad), (_, after_rad)] =
-        [-STEP_M, STEP_M].map(|step_m| way.at(along_m + step_m));
-    wrapped_rad(after_rad - before_rad) / (2.0 * STEP_M)
 }

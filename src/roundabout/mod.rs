@@ -6,9 +6,11 @@
 
 mod advice;
 mod arms;
+mod bend;
 mod finder;
 mod gap;
 mod lanes;
+mod leaving;
 mod on_lane;
 mod own;
 mod sight;

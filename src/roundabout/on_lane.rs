@@ -37,6 +37,8 @@ pub struct OnLane {
     pub mean_speed_mps: f64,
     /// For how long somebody has been seen since he is listed.
     pub known_s: f64,
+    /// Arm by which somebody came in, if that was seen.
+    pub came_in_by: Option<usize>,
 }
 
 impl OnLane {

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use super::bend;
 use crate::ego::geodesy::LocalFrame;
 use crate::ego::wrapped_rad;
 use crate::roadmap::{Access, DrivenRoundabout, LaneKind, Origin, Polyline, Ring, Roundabout};
@@ -45,6 +46,8 @@ pub(super) struct Entry {
     pub(super) width_m: f64,
     /// Where it meets the circle.
     pub(super) mouth_rad: f64,
+    /// Where along it the bend into the circle begins.
+    pub(super) bend_m: f64,
     /// What it crosses, in the order in which it is met.
     pub(super) conflicts: Vec<Conflict>,
 }
@@ -224,6 +227,7 @@ impl Site {
         conflicts.push(self.conflict(&way, road, way.length_m()));
         Some(Entry {
             mouth_rad: self.angle_rad(*way.points_m().last()?),
+            bend_m: bend::begin_m(&way, self.rings[road].circle.radius_m),
             way,
             width_m,
             conflicts,

@@ -1,6 +1,7 @@
 mod exits;
 mod found;
 mod hidden;
+mod ways;
 
 use std::f64::consts::PI;
 

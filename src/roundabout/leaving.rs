@@ -1,0 +1,46 @@
+//! Where somebody leaves the circle: nobody says so, but he has more exits before him when he has just come in.
+
+use super::site::Site;
+
+/// Probability that one stays at an exit of whom it is not known where he came in: unknown.
+const STAYS: f64 = 0.6;
+/// Share of those who leave where they came in, and of those who go round once more, beside those who leave at
+/// any other arm: all others are as probable.
+const TURNS_BACK: f64 = 0.15;
+const GOES_ON: f64 = 0.15;
+
+/// Probability that somebody who is at a direction from the middle, and came in by an arm, is still on the circle so
+/// much further round.
+pub(super) fn still_there(site: &Site, angle_rad: f64, round_rad: f64, from: Option<usize>) -> f64 {
+    let exits = || {
+        let exits = site.arms.iter().enumerate();
+        exits.filter_map(|(arm, ways)| {
+            let exit = ways.exits.first()?;
+            Some((arm, site.round_rad(angle_rad, exit.mouth_rad)))
+        })
+    };
+    let passed = || exits().filter(|&(_, away_rad)| away_rad < round_rad);
+    let own_rad = from.and_then(|from| exits().find(|&(arm, _)| arm == from));
+    let Some((own, own_rad)) = own_rad else {
+        return libm::pow(STAYS, passed().count() as f64);
+    };
+    let share = |(arm, away_rad): (usize, f64)| match arm {
+        _ if arm == own => TURNS_BACK,
+        _ if away_rad < own_rad => 1.0,
+        _ => 0.0,
+    };
+    let all: f64 = exits().map(share).sum();
+    let left: f64 = passed().map(share).sum();
+    1.0 - left / (all + GOES_ON)
+}
+
+/// Probability that somebody on the circle takes the exit of an arm when he comes to it.
+pub(super) fn takes(site: &Site, arm: usize, from: Option<usize>) -> f64 {
+    /// Just before the mouth, and just behind it.
+    const BESIDE_RAD: f64 = 1e-6;
+    let Some(exit) = site.arms[arm].exits.first() else {
+        return 0.0;
+    };
+    let before_rad = exit.mouth_rad - site.side() * BESIDE_RAD;
+    1.0 - still_there(site, before_rad, 2.0 * BESIDE_RAD, from)
+}

@@ -1,0 +1,99 @@
+//! Where somebody comes in and leaves.
+
+use super::*;
+use crate::roundabout::leaving::still_there;
+
+/// A car on the western arm's way in, so far before its end.
+fn coming(left_m: f64, speed_mps: f64, watcher: &Watcher) -> Object {
+    let site = &watcher.sites[0];
+    let western = site.arms.iter().max_by(|a, b| {
+        let away = |arm: &site::SiteArm| arm.bearing_rad.abs();
+        away(a).total_cmp(&away(b))
+    });
+    let way = &western.unwrap().entries[0].way;
+    let ([x, y], yaw_rad) = way.at(way.length_m() - left_m);
+    Object {
+        centre_m: [x, y, 0.7],
+        yaw_rad,
+        yaw_rate_radps: 0.0,
+        ..round(Class::Car, ROAD_M, 0.0, speed_mps)
+    }
+}
+
+/// One that has watched a car come.
+fn who_saw(left_m: f64, speed_mps: f64) -> Watcher {
+    let mut watcher = watcher();
+    watcher.watch(&situation(&[]));
+    let object = coming(left_m, speed_mps, &watcher);
+    for micros in [100_000, 1_200_000, 1_300_000] {
+        watcher.watch(&Situation {
+            time: Time::from_micros(NOW.micros() + micros),
+            ..situation(std::slice::from_ref(&object))
+        });
+    }
+    watcher
+}
+
+/// The car's window at the southern arm's way in.
+fn window(watcher: &Watcher) -> Window {
+    let advice = watcher.advice().unwrap();
+    let own = advice.own_arm.unwrap();
+    let mut windows = advice.windows.iter();
+    let at_own = windows.find(|window| window.arm == own && !window.at_exit);
+    *at_own.unwrap_or_else(|| panic!("{:?}", advice.windows))
+}
+
+#[test]
+fn who_comes_in_fast_comes_as_late_as_the_bend_lets_him() {
+    let expected_s = |speed_mps| window(&who_saw(30.0, speed_mps)).expected_s;
+    let (slow_s, fast_s) = (expected_s(6.0), expected_s(12.0));
+    // 12 m of the corner and some of the circle take as long for both.
+    let way_m = window(&who_saw(30.0, 6.0)).way_m;
+    assert!((way_m / 6.0 - slow_s).abs() < 0.5, "{slow_s}");
+    assert!(
+        fast_s > 0.7 * slow_s && fast_s < slow_s,
+        "{fast_s} {slow_s}"
+    );
+}
+
+#[test]
+fn who_came_in_is_remembered_on_the_circle() {
+    let mut watcher = who_saw(3.0, 6.0);
+    let arm = match watcher.lanes[0][0].place {
+        Place::Entry(arm, _) => arm,
+        other => panic!("{other:?}"),
+    };
+    let on_circle = round(Class::Car, ROAD_M, 250.0, 6.0);
+    for micros in [1_400_000, 1_500_000, 1_600_000] {
+        watcher.watch(&Situation {
+            time: Time::from_micros(NOW.micros() + micros),
+            ..situation(std::slice::from_ref(&on_circle))
+        });
+    }
+    let on = watcher.lanes[0][0];
+    assert!(matches!(on.place, Place::Ring(_)), "{on:?}");
+    assert_eq!(on.came_in_by, Some(arm));
+}
+
+#[test]
+fn nobody_is_likely_to_pass_the_last_exit_before_his_own() {
+    let watcher = known(&[]);
+    let site = &watcher.sites[0];
+    let angle_rad = site.arms[0].entries[0].mouth_rad;
+    let quarters = |count: f64| still_there(site, angle_rad, count * PI / 2.0, Some(0));
+    let unknown = |count: f64| still_there(site, angle_rad, count * PI / 2.0, None);
+    // A quarter of the way round is the first exit, and so on; as many leave by each.
+    let shares = [1.0, 2.0, 3.0, 4.0].map(quarters);
+    let leave = [
+        1.0 - shares[0],
+        shares[0] - shares[1],
+        shares[1] - shares[2],
+    ];
+    assert!((leave[0] - leave[1]).abs() < 1e-9 && (leave[1] - leave[2]).abs() < 1e-9);
+    assert!(
+        shares[2] < 0.1 && shares[3] < shares[2] && shares[3] > 0.03,
+        "{shares:?}"
+    );
+    // Of somebody whose way in was not seen, each exit is as good as another.
+    assert!((unknown(2.0) - unknown(1.0) * unknown(1.0)).abs() < 1e-9);
+}
