@@ -46,6 +46,18 @@ const END_ON_M: Range<f64> = 1.3..2.15;
 /// ...if so little of the other is seen.
 const END_ON_DEPTH_M: f64 = 0.9;
 
+/// Where something goes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Course {
+    /// Counter-clockwise from the local frame's x axis.
+    pub(super) direction_rad: f64,
+    pub(super) deviation_rad: f64,
+    /// Whether there is no doubt of it.
+    pub(super) is_clear: bool,
+    /// Whether it may go backwards.
+    pub(super) may_be_backwards: bool,
+}
+
 impl Shape {
     /// The shape of a first look.
     pub(super) fn first(spots: &[Spot], look: &Look, outline: &mut Vec<[f64; 2]>) -> Self {
@@ -214,32 +226,38 @@ impl Shape {
     }
 
     /// Takes the direction of motion in.
-    pub(super) fn measure_course(&mut self, course_rad: f64, deviation_rad: f64, is_fast: bool) {
-        let off = wrapped_rad(course_rad - self.yaw_rad);
+    pub(super) fn measure_course(&mut self, course: &Course) {
+        let &Course {
+            direction_rad,
+            deviation_rad,
+            is_clear,
+            may_be_backwards,
+        } = course;
+        let off = wrapped_rad(direction_rad - self.yaw_rad);
         if !self.front_known {
-            if is_fast {
+            if is_clear {
                 // The first clear motion says where the front is.
                 if off.abs() > 0.6 {
                     if off.abs() < 2.5 {
                         self.seen_m = quarter_turned(off, self.seen_m);
                         self.whole = [0.0; 2];
                     }
-                    (self.yaw_rad, self.yaw_variance) = (course_rad, deviation_rad * deviation_rad);
+                    (self.yaw_rad, self.yaw_variance) =
+                        (direction_rad, deviation_rad * deviation_rad);
                 }
                 self.front_known = true;
             }
             return;
         }
-        let reversing = off.abs() > 2.0;
-        let off = if reversing {
+        let off = if may_be_backwards && off.abs() > 2.0 {
             wrapped_rad(off + std::f64::consts::PI)
         } else {
             off
         };
         if off.abs() < 1.0 {
             self.correct_yaw(off, deviation_rad);
-        } else if is_fast {
-            (self.yaw_rad, self.yaw_variance) = (course_rad, deviation_rad * deviation_rad);
+        } else if is_clear {
+            (self.yaw_rad, self.yaw_variance) = (direction_rad, deviation_rad * deviation_rad);
         }
     }
 
