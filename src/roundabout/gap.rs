@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use super::RoundaboutParameters;
 use super::bend::{Bend, round_mps};
-use super::leaving::still_there;
+use super::leaving::{MOUTH_M, still_there};
 use super::on_lane::{NEW_S, OnLane, Place};
 use super::site::{Conflict, Site};
 use super::unseen::fastest_mps;
@@ -217,7 +217,11 @@ fn way_to(
                 behind(radius_m * round_rad, radius_m)
             };
             let stays = if own.kind == LaneKind::Road && way_m > 0.0 {
-                still_there(site, angle_rad, round_rad, on.came_in_by)
+                // Who leaves from an inner lane is still on it where the mouth of the exit begins.
+                let is_inner = site.outermost_road() != Some(index);
+                let late_rad = if is_inner { MOUTH_M / radius_m } else { 0.0 };
+                let past_rad = angle_rad - site.side() * late_rad;
+                still_there(site, past_rad, round_rad + late_rad, on.came_in_by)
             } else {
                 1.0
             };

@@ -2,7 +2,7 @@
 //!
 //! Numbers without another source were set with `scripts/evaluate-roundabouts --seeds 1-8`.
 
-use super::leaving::takes;
+use super::leaving::{MOUTH_M, takes};
 use super::on_lane::{NEW_S, OnLane, Place};
 use super::site::Site;
 use crate::ego::wrapped_rad;
@@ -77,8 +77,6 @@ const OTHERWISE: f64 = 0.05;
 const MEAN_SHARE: f64 = 0.14;
 /// Cosine of the direction against a lane within which somebody goes along it.
 const LEADS: f64 = 0.3;
-/// So far into an exit one may have come from the circle.
-const MOUTH_M: f64 = 6.0;
 /// Density of road users beside all lanes, in place of a lane's by place and heading.
 const ELSEWHERE: f64 = 0.02;
 /// Share of those met near a roundabout on roads, bikeways and pavements.

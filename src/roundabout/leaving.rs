@@ -9,6 +9,9 @@ const STAYS: f64 = 0.6;
 const TURNS_BACK: f64 = 0.15;
 const GOES_ON: f64 = 0.15;
 
+/// So far into an exit one may have come from the circle.
+pub(super) const MOUTH_M: f64 = 6.0;
+
 /// Probability that somebody who is at a direction from the middle, and came in by an arm, is still on the circle so
 /// much further round.
 pub(super) fn still_there(site: &Site, angle_rad: f64, round_rad: f64, from: Option<usize>) -> f64 {

@@ -18,11 +18,13 @@ const ROAD_M: f64 = 11.0;
 const BIKEWAY_M: f64 = 16.6;
 
 fn watcher() -> Watcher {
+    watcher_at("roundabout-traffic")
+}
+
+/// One that knows the roads of a scenario.
+fn watcher_at(name: &str) -> Watcher {
     let mut watcher = Watcher::new(&RoundaboutParameters::profile(Profile::Default));
-    let roads = scenario::find("roundabout-traffic")
-        .unwrap()
-        .roads()
-        .unwrap();
+    let roads = scenario::find(name).unwrap().roads().unwrap();
     assert_eq!(watcher.take_map(&roads), 1);
     watcher
 }
@@ -77,7 +79,7 @@ fn situation(objects: &[Object]) -> Situation<'_> {
 /// Who is watched for so long is no newcomer.
 fn known(objects: &[Object]) -> Watcher {
     let mut watcher = watcher();
-    for micros in [-1_100_000, -100_000] {
+    for micros in [-1_600_000, -100_000] {
         watcher.watch(&Situation {
             time: Time::from_micros(NOW.micros() + micros),
             ..situation(objects)

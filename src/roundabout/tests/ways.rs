@@ -22,7 +22,10 @@ fn coming(left_m: f64, speed_mps: f64, watcher: &Watcher) -> Object {
 
 /// One that has watched a car come.
 fn who_saw(left_m: f64, speed_mps: f64) -> Watcher {
-    let mut watcher = watcher();
+    who_saw_at(watcher(), left_m, speed_mps)
+}
+
+fn who_saw_at(mut watcher: Watcher, left_m: f64, speed_mps: f64) -> Watcher {
     watcher.watch(&situation(&[]));
     let object = coming(left_m, speed_mps, &watcher);
     for micros in [100_000, 1_200_000, 1_300_000] {
@@ -96,4 +99,38 @@ fn nobody_is_likely_to_pass_the_last_exit_before_his_own() {
     );
     // Of somebody whose way in was not seen, each exit is as good as another.
     assert!((unknown(2.0) - unknown(1.0) * unknown(1.0)).abs() < 1e-9);
+}
+
+#[test]
+fn who_is_on_the_inner_lane_may_leave_where_the_mouth_of_the_exit_begins() {
+    const INNER_M: f64 = 15.0;
+    let mut watcher = who_saw_at(watcher_at("two-lane-roundabout"), 3.0, 8.0);
+    // He has come in from the west and is 2 m past where the outer lane's exit to the north begins.
+    let northern = |arm: &site::SiteArm| (arm.bearing_rad - PI / 2.0).abs() < 0.1;
+    let site = &watcher.sites[0];
+    let number = site.arms.iter().position(northern).unwrap();
+    let angle_rad = site.arms[number].exits[0].mouth_rad + 2.0 / INNER_M;
+    let (sine, cosine) = angle_rad.sin_cos();
+    let on_inner = Object {
+        centre_m: [
+            site.centre_m[0] + INNER_M * cosine,
+            site.centre_m[1] + INNER_M * sine,
+            0.7,
+        ],
+        ..round(Class::Car, INNER_M, angle_rad.to_degrees(), 8.0)
+    };
+    for micros in [1_400_000, 1_500_000, 1_600_000] {
+        watcher.watch(&Situation {
+            time: Time::from_micros(NOW.micros() + micros),
+            ..situation(std::slice::from_ref(&on_inner))
+        });
+    }
+    assert_eq!(watcher.lanes[0][0].place, Place::Ring(0));
+    let windows = watcher.advice().unwrap().windows.iter();
+    let at_arm = |window: &&Window| window.arm == number && !window.at_exit;
+    let probability: f64 = windows
+        .filter(at_arm)
+        .map(|window| window.probability)
+        .sum();
+    assert!((0.01..0.5).contains(&probability), "{probability}");
 }
