@@ -258,8 +258,9 @@ struct Approach {
     speeds_mps: [f64; 2],
     /// How far the conflict reaches along it, to either side.
     zone_m: f64,
-    /// As fast as anybody comes there.
+    /// As fast as anybody comes there, and on the way in.
     fastest_mps: f64,
+    road_mps: f64,
     /// Whether he is on the circle already.
     on_circle: bool,
     /// What he slows down for, if he is not.
@@ -286,7 +287,8 @@ impl Approach {
                 [on.speed_mps.abs(), on.mean_speed_mps.abs()]
             },
             zone_m: asked.width_m / 2.0,
-            fastest_mps: fastest_mps(conflict.kind, asked.road_mps),
+            fastest_mps: fastest_mps(&asked.site.rings[conflict.ring], asked.road_mps),
+            road_mps: asked.road_mps,
             on_circle: matches!(on.place, Place::Ring(_)) && conflict.kind == LaneKind::Road,
             bend: bend_before(asked.site, conflict, on),
             known_s: on.known_s,
@@ -347,10 +349,23 @@ impl Approach {
         }
         // Nobody knows yet how fast he is, or which way he goes.
         if self.known_s < NEW_S {
-            begin_s = begin_s.min(left_m / self.fastest_mps);
+            begin_s = begin_s.min(self.soonest_s(left_m, 0.0));
         }
         // However little is known of his speed.
-        begin_s.max(left_m / self.fastest_mps.max(mean_mps))
+        begin_s.max(self.soonest_s(left_m, mean_mps))
+    }
+
+    /// How long the way takes anybody, or him if he is seen to be faster.
+    fn soonest_s(&self, left_m: f64, mean_mps: f64) -> f64 {
+        let fastest_mps = self.fastest_mps.max(mean_mps);
+        match self.bend {
+            Some(bend) => Bend {
+                speed_mps: self.fastest_mps,
+                ..bend
+            }
+            .time_s(left_m, self.road_mps.max(mean_mps)),
+            None => left_m / fastest_mps,
+        }
     }
 
     /// When he has gone so far, so many deviations later: it is not known where he is, and not how fast. He goes round

@@ -4,10 +4,11 @@
 
 use std::f64::consts::TAU;
 
+use super::bend::{Bend, fastest_round_mps};
 use super::gap::{User, Users};
 use super::sight::Sight;
 use super::site::{Conflict, Entry, Site};
-use crate::roadmap::LaneKind;
+use crate::roadmap::{LaneKind, Ring};
 use crate::track::Object;
 
 /// Who is listed within this of a place is who is there.
@@ -83,7 +84,7 @@ impl Unseen {
         for (index, (ring, stretch)) in site.rings.iter().zip(&mut self.rings).enumerate() {
             let count = libm::ceil(TAU * ring.circle.radius_m / APART_M).clamp(8.0, 400.0) as usize;
             stretch.fit(count);
-            for _ in 0..stretch.steps(passed_s, fastest_mps(ring.kind, road_mps)) {
+            for _ in 0..stretch.steps(passed_s, fastest_mps(ring, road_mps)) {
                 stretch.go_round(ring.kind == LaneKind::Pavement);
             }
             if site.outermost_road() == Some(index) {
@@ -152,17 +153,24 @@ impl Unseen {
                 ring.circle.radius_m * round_rad.min(back_rad)
             };
             let nearest_m = hidden.clone().map(way_m).fold(f64::INFINITY, f64::min);
-            soonest_s = soonest_s.min(nearest_m / fastest_mps(ring.kind, road_mps));
+            soonest_s = soonest_s.min(nearest_m / fastest_mps(ring, road_mps));
             least_share = least_share.min(1.0 - hidden.count() as f64 / count.max(1) as f64);
         }
         if conflict.kind == LaneKind::Road {
             let others = entries(site).zip(&self.ways);
             for ((_, entry), stretch) in others.filter(|((other, _), _)| *other != arm) {
-                let nearest = stretch.may_hold.iter().position(|&looks| looks > 0);
-                let back_m = nearest.map_or(f64::INFINITY, |place| APART_M * place as f64);
+                let Some(nearest) = stretch.may_hold.iter().position(|&looks| looks > 0) else {
+                    continue;
+                };
+                let back_m = APART_M * nearest as f64;
                 let round_rad = site.round_rad(entry.mouth_rad, conflict.angle_rad);
-                let way_m = back_m + site.rings[conflict.ring].circle.radius_m * round_rad;
-                soonest_s = soonest_s.min(way_m / road_mps);
+                let ring = &site.rings[conflict.ring];
+                let bend = Bend {
+                    left_m: back_m - (entry.way.length_m() - entry.bend_m),
+                    speed_mps: fastest_mps(ring, road_mps),
+                };
+                let way_m = back_m + ring.circle.radius_m * round_rad;
+                soonest_s = soonest_s.min(bend.time_s(way_m, road_mps));
             }
         }
         (soonest_s, least_share)
@@ -265,9 +273,10 @@ impl Look<'_> {
     }
 }
 
-pub(super) fn fastest_mps(kind: LaneKind, road_mps: f64) -> f64 {
-    match kind {
-        LaneKind::Road => road_mps,
+/// As fast as anybody comes along a ring.
+pub(super) fn fastest_mps(ring: &Ring, road_mps: f64) -> f64 {
+    match ring.kind {
+        LaneKind::Road => road_mps.min(fastest_round_mps(ring.circle.radius_m)),
         LaneKind::Bikeway => CYCLIST_MPS,
         LaneKind::Pavement => WALKER_MPS,
     }
@@ -338,10 +347,11 @@ mod tests {
         });
         let mut soonest_s: Vec<f64> = soonest_s.collect();
         soonest_s.sort_by(f64::total_cmp);
-        // Ten places back, and a quarter of the circle from arm to arm, of a radius of 11 m.
-        let quarter_s = 11.0 * TAU / 4.0 / 8.0;
+        // Ten places back, of which twelve metres are a bend, and a quarter of the circle from arm to arm, of a radius of 11 m.
+        let round_mps = fastest_round_mps(11.0);
         for (quarters, said_s) in (1..4).zip(soonest_s) {
-            let due_s = 10.0 * APART_M / 8.0 + f64::from(quarters) * quarter_s;
+            let bent_m = 12.0 + 11.0 * TAU / 4.0 * f64::from(quarters);
+            let due_s = (10.0 * APART_M - 12.0) / 8.0 + bent_m / round_mps;
             assert!((said_s - due_s).abs() < 0.2, "{said_s} {due_s}");
         }
     }

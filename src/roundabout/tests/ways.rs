@@ -60,6 +60,20 @@ fn who_comes_in_fast_comes_as_late_as_the_bend_lets_him() {
 }
 
 #[test]
+fn who_has_just_come_into_view_slows_down_before_the_bend_too() {
+    let mut watcher = known(&[]);
+    let object = coming(40.0, 3.0, &watcher);
+    watcher.watch(&situation(std::slice::from_ref(&object)));
+    let window = window(&watcher);
+    let road_mps = RoundaboutParameters::profile(Profile::Default).speed_mps;
+    let soonest_s = (window.way_m - 5.0) / road_mps;
+    assert!(
+        window.begin_s > soonest_s + 0.2 && window.begin_s < soonest_s + 1.5,
+        "{window:?}"
+    );
+}
+
+#[test]
 fn who_came_in_is_remembered_on_the_circle() {
     let mut watcher = who_saw(3.0, 6.0);
     let arm = match watcher.lanes[0][0].place {
