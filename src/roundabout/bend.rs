@@ -44,6 +44,15 @@ impl Bend {
             + 2.0 * braked_m / (speed_mps + then_mps)
             + bent_m / self.speed_mps
     }
+
+    /// How long so far takes him at least who comes so fast, if nobody drives through the bend faster.
+    pub(super) fn soonest_s(&self, way_m: f64, speed_mps: f64) -> f64 {
+        if self.left_m > 0.0 {
+            self.time_s(way_m, speed_mps)
+        } else {
+            way_m / self.speed_mps
+        }
+    }
 }
 
 /// Where a way begins to bend before it meets a circle; its end if it does not.
@@ -103,6 +112,9 @@ mod tests {
             ..bend
         };
         assert_eq!(past.time_s(40.0, 8.0), 5.0);
+        // Of whom nothing is known but that he is in it, nobody is faster than the bend lets him.
+        assert_eq!(past.soonest_s(40.0, 8.0), 8.0);
+        assert_eq!(bend.soonest_s(40.0, 8.0), bend.time_s(40.0, 8.0));
     }
 
     #[test]

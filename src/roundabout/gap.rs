@@ -355,16 +355,12 @@ impl Approach {
         begin_s.max(self.soonest_s(left_m, mean_mps))
     }
 
-    /// How long the way takes anybody, or him if he is seen to be faster.
-    fn soonest_s(&self, left_m: f64, mean_mps: f64) -> f64 {
-        let fastest_mps = self.fastest_mps.max(mean_mps);
+    /// How long a way takes anybody, or him if he is seen to be faster.
+    fn soonest_s(&self, way_m: f64, mean_mps: f64) -> f64 {
+        let speed_mps = self.fastest_mps.max(mean_mps);
         match self.bend {
-            Some(bend) => Bend {
-                speed_mps: self.fastest_mps,
-                ..bend
-            }
-            .time_s(left_m, self.road_mps.max(mean_mps)),
-            None => left_m / fastest_mps,
+            Some(bend) => Bend { speed_mps, ..bend }.soonest_s(way_m, self.road_mps.max(mean_mps)),
+            None => way_m / speed_mps,
         }
     }
 

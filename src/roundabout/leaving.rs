@@ -4,8 +4,8 @@ use super::site::Site;
 
 /// Probability that one stays at an exit of whom it is not known where he came in: unknown.
 const STAYS: f64 = 0.6;
-/// Share of those who leave where they came in, and of those who go round once more, beside those who leave at
-/// any other arm: all others are as probable.
+/// Of those who leave where they came in, and of those who go round once more, beside one who leaves at any other
+/// arm, all of which are as probable: unknown, one in twenty at four arms.
 const TURNS_BACK: f64 = 0.15;
 const GOES_ON: f64 = 0.15;
 

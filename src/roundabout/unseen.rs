@@ -170,7 +170,7 @@ impl Unseen {
                     speed_mps: fastest_mps(ring, road_mps),
                 };
                 let way_m = back_m + ring.circle.radius_m * round_rad;
-                soonest_s = soonest_s.min(bend.time_s(way_m, road_mps));
+                soonest_s = soonest_s.min(bend.soonest_s(way_m, road_mps));
             }
         }
         (soonest_s, least_share)
