@@ -15,26 +15,31 @@ pub(super) const MOUTH_M: f64 = 6.0;
 /// Probability that somebody who is at a direction from the middle, and came in by an arm, is still on the circle so
 /// much further round.
 pub(super) fn still_there(site: &Site, angle_rad: f64, round_rad: f64, from: Option<usize>) -> f64 {
-    let exits = || {
-        let exits = site.arms.iter().enumerate();
-        exits.filter_map(|(arm, ways)| {
-            let exit = ways.exits.first()?;
-            Some((arm, site.round_rad(angle_rad, exit.mouth_rad)))
-        })
+    let away_rad = |arm: usize| {
+        let exit = site.arms[arm].exits.first()?;
+        Some(site.round_rad(angle_rad, exit.mouth_rad))
     };
-    let passed = || exits().filter(|&(_, away_rad)| away_rad < round_rad);
-    let own_rad = from.and_then(|from| exits().find(|&(arm, _)| arm == from));
-    let Some((own, own_rad)) = own_rad else {
-        return libm::pow(STAYS, passed().count() as f64);
+    let own = from.and_then(|own| Some((own, away_rad(own)?)));
+    let share = |arm: usize, away_rad: f64| match own {
+        Some((own, _)) if arm == own => TURNS_BACK,
+        Some((_, own_rad)) if away_rad > own_rad => 0.0,
+        _ => 1.0,
     };
-    let share = |(arm, away_rad): (usize, f64)| match arm {
-        _ if arm == own => TURNS_BACK,
-        _ if away_rad < own_rad => 1.0,
-        _ => 0.0,
-    };
-    let all: f64 = exits().map(share).sum();
-    let left: f64 = passed().map(share).sum();
-    1.0 - left / (all + GOES_ON)
+    let (mut all, mut left) = (GOES_ON, 0.0);
+    for arm in 0..site.arms.len() {
+        let Some(away_rad) = away_rad(arm) else {
+            continue;
+        };
+        let share = share(arm, away_rad);
+        all += share;
+        if away_rad < round_rad {
+            left += share;
+        }
+    }
+    match own {
+        Some(_) => 1.0 - left / all,
+        None => libm::pow(STAYS, left),
+    }
 }
 
 /// Probability that somebody on the circle takes the exit of an arm when he comes to it.

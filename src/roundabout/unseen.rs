@@ -191,9 +191,12 @@ fn reach_m(object: &Object) -> f64 {
 fn is_listed(objects: &[Object], at_m: [f64; 2]) -> bool {
     objects.iter().any(|object| {
         let [x, y, _] = object.centre_m;
-        let reach_m = LISTED_M.max(reach_m(object));
-        libm::hypot(x - at_m[0], y - at_m[1]) < reach_m
+        is_within([x, y], at_m, LISTED_M.max(reach_m(object)))
     })
+}
+
+fn is_within([x, y]: [f64; 2], [u, v]: [f64; 2], reach_m: f64) -> bool {
+    (u - x) * (u - x) + (v - y) * (v - y) < reach_m * reach_m
 }
 
 impl Stretch {
@@ -269,7 +272,7 @@ impl Look<'_> {
     /// Whether somebody was there who is not listed any more.
     fn is_missed(&self, at_m: [f64; 2]) -> bool {
         let mut missing = self.missing.iter();
-        missing.any(|&([x, y], reach_m)| libm::hypot(x - at_m[0], y - at_m[1]) < reach_m)
+        missing.any(|&(other_m, reach_m)| is_within(other_m, at_m, reach_m))
     }
 }
 
