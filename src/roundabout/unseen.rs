@@ -247,13 +247,16 @@ impl Stretch {
         for (place, may_hold) in self.may_hold.iter_mut().enumerate() {
             let at_m = place_m(place);
             let is_listed = is_listed(look.objects, at_m);
-            *may_hold = match (look.sight.reaches(at_m), is_listed) {
-                (true, true) => 0,
-                (true, false) => may_hold.saturating_sub(1),
-                // Should he not be listed any more, he is still there.
-                (false, true) => (*may_hold).max(1),
-                (false, false) => *may_hold,
-            };
+            // Where nobody was and nobody is listed, nobody is, be it seen or not.
+            if is_listed || *may_hold > 0 {
+                *may_hold = match (look.sight.reaches(at_m), is_listed) {
+                    (true, true) => 0,
+                    (true, false) => may_hold.saturating_sub(1),
+                    // Should he not be listed any more, he is still there.
+                    (false, true) => (*may_hold).max(1),
+                    (false, false) => *may_hold,
+                };
+            }
             if !is_listed && look.is_missed(at_m) {
                 *may_hold = LOOKS;
             }
