@@ -239,15 +239,16 @@ fn way_to(
     }
 }
 
-/// The bend between somebody on a way in and a conflict point.
-fn bend_before(site: &Site, conflict: &Conflict, on: &OnLane) -> Option<Bend> {
-    let Place::Entry(arm, lane) = on.place else {
-        return None;
+/// The bend between somebody on a way in and a conflict point; elsewhere he is in it.
+fn bend_before(site: &Site, conflict: &Conflict, on: &OnLane) -> Bend {
+    let left_m = match on.place {
+        Place::Entry(arm, lane) => site.arms[arm].entries[lane].bend_m - on.along_m,
+        _ => 0.0,
     };
-    Some(Bend {
-        left_m: site.arms[arm].entries[lane].bend_m - on.along_m,
+    Bend {
+        left_m,
         speed_mps: round_mps(site.rings[conflict.ring].circle.radius_m),
-    })
+    }
 }
 
 /// How somebody comes to a conflict point.
@@ -263,8 +264,8 @@ struct Approach {
     road_mps: f64,
     /// Whether he is on the circle already.
     on_circle: bool,
-    /// What he slows down for, if he is not.
-    bend: Option<Bend>,
+    /// What he slows down for.
+    bend: Bend,
     /// For how long he has been seen since he is listed.
     known_s: f64,
     /// That he comes so.
@@ -357,11 +358,11 @@ impl Approach {
 
     /// How long a way takes anybody, or him if he is seen to be faster.
     fn soonest_s(&self, way_m: f64, mean_mps: f64) -> f64 {
-        let speed_mps = self.fastest_mps.max(mean_mps);
-        match self.bend {
-            Some(bend) => Bend { speed_mps, ..bend }.soonest_s(way_m, self.road_mps.max(mean_mps)),
-            None => way_m / speed_mps,
-        }
+        let bend = Bend {
+            speed_mps: self.fastest_mps.max(mean_mps),
+            ..self.bend
+        };
+        bend.soonest_s(way_m, self.road_mps.max(mean_mps))
     }
 
     /// When he has gone so far, so many deviations later: it is not known where he is, and not how fast. He goes round
@@ -376,16 +377,12 @@ impl Approach {
     ) -> f64 {
         let [x, y] = object.position_deviation_m;
         let moving_mps = speed_mps.max(WAITS_MPS);
-        let time_s = |way_m: f64| match self.bend {
-            Some(bend) => Bend {
-                speed_mps: varies * bend.speed_mps,
-                ..bend
-            }
-            .time_s(way_m, moving_mps),
-            None => way_m / moving_mps,
+        let bend = Bend {
+            speed_mps: varies * self.bend.speed_mps,
+            ..self.bend
         };
         let wander_m = way_m.max(0.0) / moving_mps * object.speed_deviation_mps;
         let blur_m = libm::hypot(x.max(y).min(MOST_BLUR_M), wander_m);
-        time_s(way_m + deviations * blur_m)
+        bend.time_s(way_m + deviations * blur_m, moving_mps)
     }
 }

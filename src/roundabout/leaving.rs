@@ -44,11 +44,10 @@ pub(super) fn still_there(site: &Site, angle_rad: f64, round_rad: f64, from: Opt
 
 /// Probability that somebody on the circle takes the exit of an arm when he comes to it.
 pub(super) fn takes(site: &Site, arm: usize, from: Option<usize>) -> f64 {
-    /// Just before the mouth, and just behind it.
-    const BESIDE_RAD: f64 = 1e-6;
-    let Some(exit) = site.arms[arm].exits.first() else {
-        return 0.0;
-    };
-    let before_rad = exit.mouth_rad - site.side() * BESIDE_RAD;
-    1.0 - still_there(site, before_rad, 2.0 * BESIDE_RAD, from)
+    /// Only this exit is passed so soon.
+    const JUST_BEHIND_RAD: f64 = 1e-6;
+    let exit = site.arms[arm].exits.first();
+    exit.map_or(0.0, |exit| {
+        1.0 - still_there(site, exit.mouth_rad, JUST_BEHIND_RAD, from)
+    })
 }
