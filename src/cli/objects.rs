@@ -38,6 +38,7 @@ struct ObjectEntry<'a> {
     confidence: f64,
     measured: bool,
     points: usize,
+    speed_deviation: f64,
 }
 
 #[derive(Serialize)]
@@ -89,6 +90,7 @@ pub(super) fn line(report: &RevolutionReport, objects: &[Object]) -> Result<Vec<
         confidence: object.existence,
         measured: object.measured,
         points: object.points,
+        speed_deviation: object.speed_deviation_mps,
     };
     with_newline(&ObjectsLine {
         t: report.time.seconds(),

@@ -81,9 +81,11 @@ const ALONG_SHARE: f64 = 0.7;
 /// Time that a road user must have been gone before the vehicle comes.
 pub(super) const BEHIND_S: f64 = 0.3;
 /// Standard deviations that a window is widened by at either end.
-const DEVIATIONS: f64 = 0.3;
+const DEVIATIONS: f64 = 0.4;
 /// The same of somebody who is hidden.
 const DEVIATIONS_HIDDEN: f64 = 1.0;
+/// And how much faster a newcomer may be than he seems.
+const DEVIATIONS_NEW: f64 = 2.0;
 /// Slower ones on the circle may gather speed, and so fast.
 const SLOW_MPS: f64 = 2.0;
 const STARTS_MPS2: f64 = 3.0;
@@ -348,9 +350,14 @@ impl Approach {
         if self.on_circle && mean_mps < SLOW_MPS {
             begin_s = begin_s.min(libm::sqrt(2.0 * left_m / STARTS_MPS2));
         }
-        // Nobody knows yet how fast he is, or which way he goes.
+        // It is not known yet how fast he is, or that he moves at all.
         if self.known_s < NEW_S {
-            begin_s = begin_s.min(self.soonest_s(left_m, 0.0));
+            begin_s = begin_s.min(if mean_mps < WAITS_MPS {
+                self.soonest_s(left_m, 0.0)
+            } else {
+                let faster_mps = mean_mps + DEVIATIONS_NEW * object.speed_deviation_mps;
+                self.bend(VARIES).time_s(left_m, faster_mps)
+            });
         }
         // However little is known of his speed.
         begin_s.max(self.soonest_s(left_m, mean_mps))
@@ -377,12 +384,17 @@ impl Approach {
     ) -> f64 {
         let [x, y] = object.position_deviation_m;
         let moving_mps = speed_mps.max(WAITS_MPS);
-        let bend = Bend {
-            speed_mps: varies * self.bend.speed_mps,
-            ..self.bend
-        };
         let wander_m = way_m.max(0.0) / moving_mps * object.speed_deviation_mps;
         let blur_m = libm::hypot(x.max(y).min(MOST_BLUR_M), wander_m);
-        bend.time_s(way_m + deviations * blur_m, moving_mps)
+        self.bend(varies)
+            .time_s(way_m + deviations * blur_m, moving_mps)
+    }
+
+    /// The bend before him, if he drives through it so many times as fast as most do.
+    fn bend(&self, varies: f64) -> Bend {
+        Bend {
+            speed_mps: varies * self.bend.speed_mps,
+            ..self.bend
+        }
     }
 }

@@ -73,8 +73,8 @@ const YAW_RATE_RADPS: f64 = 0.2;
 const MOVING_MPS: f64 = 0.7;
 /// Share of road users who move as none of the lanes lead: they change lanes, or turn round.
 const OTHERWISE: f64 = 0.05;
-/// Weight of a revolution in the mean speed: the last 0.7 s of ten a second.
-const MEAN_SHARE: f64 = 0.14;
+/// Weight of a revolution in the mean speed: the last second of ten a second.
+const MEAN_SHARE: f64 = 0.1;
 /// Cosine of the direction against a lane within which somebody goes along it.
 const LEADS: f64 = 0.3;
 /// Density of road users beside all lanes, in place of a lane's by place and heading.

@@ -3,9 +3,8 @@
 use super::site::Site;
 use crate::roadmap::Polyline;
 
-/// Who has been seen for less than this may be faster than he seems, and go another way
-/// (`scripts/evaluate-roundabouts --seeds 1-29`: with 1.0 and 2.0 s 3 and 2 instead of 1 of 560 gaps at the own arm
-/// are not there).
+/// Who has been seen for less than this may be faster than he seems (`scripts/evaluate-roundabouts --seeds 1-29`: with 1.0
+/// instead of 1.5 s 3 instead of 1 of 530 gaps at the own arm are not there).
 pub(super) const NEW_S: f64 = 1.5;
 
 /// A lane of the site.

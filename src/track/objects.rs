@@ -527,8 +527,8 @@ mod tests {
                 &later(&body(0, 0), 0.1 * f64::from(revolution)),
             );
         }
-        // 0.5 m behind where it would be.
-        let behind = column(20) - 4;
+        // 0.37 m behind where it would be: it brakes by 2 m/s^2.
+        let behind = column(20) - 3;
         let scan = scan_of(1800, |column, layer| {
             u16::from(column == behind && layer == 7) * 3500
         });

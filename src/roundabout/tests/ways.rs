@@ -62,7 +62,7 @@ fn who_comes_in_fast_comes_as_late_as_the_bend_lets_him() {
 #[test]
 fn who_has_just_come_into_view_slows_down_before_the_bend_too() {
     let mut watcher = known(&[]);
-    let object = coming(40.0, 3.0, &watcher);
+    let object = coming(40.0, 0.0, &watcher);
     watcher.watch(&situation(std::slice::from_ref(&object)));
     let window = window(&watcher);
     let road_mps = RoundaboutParameters::profile(Profile::Default).speed_mps;

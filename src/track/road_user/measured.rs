@@ -314,12 +314,16 @@ mod tests {
         let look = Look::at(&spots, &scan, Vector2::zeros());
         let (mut outline, mut end) = (vec![], scan.time());
         let mut track = Track::new(0, false, &spots, &look, end, 0.0, &mut outline);
-        // It was seen askew before.
-        track.shape.seen_m[1] = 0.7;
-        for _ in 0..10 {
-            end = end + Span::from_seconds(0.1);
-            track.measure(&spots, &look, end, 0.0, &mut outline);
-        }
+        let mut seen_for_a_second = |track: &mut Track| {
+            for _ in 0..10 {
+                end = end + Span::from_seconds(0.1);
+                track.measure(&spots, &look, end, 0.0, &mut outline);
+            }
+        };
+        seen_for_a_second(&mut track);
+        // As if it had been seen askew.
+        (track.shape.seen_m[1], track.shape.whole[1]) = (0.7, 0.0);
+        seen_for_a_second(&mut track);
         let wide_m = track.qualities().wide_m;
         assert!(wide_m.is_some_and(|wide_m| wide_m < 0.25), "{wide_m:?}");
     }

@@ -58,6 +58,7 @@ impl Track {
         let there = 1.0 - libm::exp(-0.5 * THERE_M * THERE_M / variance.max(1e-6));
         let height_m = shape.top_m.max(0.1);
         let speed_variance = (ahead.transpose() * estimate.velocity_covariance * ahead)[0];
+        let speed_variance = motion.innovation_ratio() * speed_variance;
         Object {
             id: self.id,
             class,
