@@ -57,8 +57,8 @@ impl Track {
         let variance = 0.5 * estimate.position_covariance.trace();
         let there = 1.0 - libm::exp(-0.5 * THERE_M * THERE_M / variance.max(1e-6));
         let height_m = shape.top_m.max(0.1);
-        let speed_variance = (ahead.transpose() * estimate.velocity_covariance * ahead)[0];
-        let speed_variance = motion.innovation_ratio() * speed_variance;
+        let along_variance = (ahead.transpose() * estimate.velocity_covariance * ahead)[0];
+        let speed_variance = motion.innovation_ratio() * along_variance;
         Object {
             id: self.id,
             class,
