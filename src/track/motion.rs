@@ -124,9 +124,8 @@ impl Motion {
 
     /// Takes in how far off a position is.
     fn note_innovation(&mut self, position_m: Vector2<f64>, noise: Matrix2<f64>) {
-        let estimate = self.estimate();
-        let innovation = position_m - estimate.position_m;
-        if let Some(inverse) = (estimate.position_covariance + noise).try_inverse() {
+        let innovation = position_m - self.position_m();
+        if let Some(inverse) = (self.position_covariance() + noise).try_inverse() {
             // Its mean is the number of dimensions.
             let squared = 0.5 * (innovation.transpose() * inverse * innovation)[0];
             self.innovation_ratio += RATIO_SHARE * (squared - self.innovation_ratio);

@@ -17,7 +17,7 @@ const FAST_MPS: f64 = 1.5;
 /// do.
 const REVERSES_MPS: f64 = 3.0;
 /// Standard deviations of its velocity above which a vehicle says where it goes. What is small turns on the
-/// spot, and its deviations are said three times as large as they are: with two of them the heading of real
+/// spot, and the filter says deviations three times as large as they are: with two of them the heading of real
 /// people in a hall is off by 89 and 102 degrees in the mean, with one by 11 and 5 (shared recordings jaemin_0 and _1).
 const VEHICLE_DEVIATIONS: f64 = 2.0;
 const DEVIATIONS: f64 = 1.0;
