@@ -46,7 +46,7 @@ const BEND: f32 = 0.012;
 const BEND_PER_M: f32 = 0.0035;
 const MOST_BEND: f32 = 0.05;
 /// How far a level may be off besides: as much as a kerb is high, with a pavement behind it.
-const SLACK_M: f32 = 0.15;
+pub(super) const KERB_M: f32 = 0.15;
 /// Levels this near to the plane are always possible, kerbs among them; farther ones as far
 /// as this many times the median of their layer, if so many sectors know it.
 const FLAT_M: f32 = 0.07;
@@ -188,8 +188,8 @@ fn follow(rings: &mut [Ring; MAX_LAYERS]) {
         let expected_m = last.level_m + slope * run_m;
         let bend = (BEND + BEND_PER_M * run_m.max(0.0)).min(MOST_BEND);
         let is_ground = run_m > 0.3
-            && (ring.level_m - expected_m).abs() < SLACK_M + bend * run_m
-            && (ring.level_m - last.level_m).abs() < SLACK_M + STEEPEST * run_m;
+            && (ring.level_m - expected_m).abs() < KERB_M + bend * run_m
+            && (ring.level_m - last.level_m).abs() < KERB_M + STEEPEST * run_m;
         if is_ground {
             // The slope from a short run is noise.
             let fresh = (ring.level_m - last.level_m) / run_m;

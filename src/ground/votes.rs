@@ -2,7 +2,7 @@
 
 use multiversion::multiversion;
 
-use super::surface::Ring;
+use super::surface::{KERB_M, Ring};
 use crate::cloud::MAX_LAYERS;
 use crate::float::{LANES, each, greatest_each, least_each};
 
@@ -10,7 +10,8 @@ use crate::float::{LANES, each, greatest_each, least_each};
 pub(super) const VOTERS: usize = 3;
 /// All that vote: they and the sector itself, which is in the middle.
 const ALL: usize = 2 * VOTERS + 1;
-/// As many of them know a level that the sector itself cannot see.
+/// As many of them know a level that the sector itself cannot see, or that rises by more than a kerb: what fewer see
+/// is the rear of a vehicle.
 const FEWEST_VOTES: f32 = 4.0;
 /// Part of its distance by which the ring of another sector may be nearer or farther.
 const ALIKE: f32 = 0.35;
@@ -47,7 +48,7 @@ fn elected_of_half(voters: [&[Ring; LANES]; ALL]) -> [Ring; LANES] {
     let median_m = median_of(&levels_m, votes);
     each(|lane| {
         let is_seen = own[lane].distance_m > 0.0;
-        if votes[lane] >= FEWEST_VOTES || votes[lane] > 0.0 && is_seen {
+        if votes[lane] >= FEWEST_VOTES || is_seen && median_m[lane] < KERB_M {
             Ring {
                 distance_m: total_m[lane] / votes[lane],
                 level_m: median_m[lane],
@@ -138,9 +139,11 @@ mod tests {
         assert_eq!((elected.distance_m, elected.level_m), (14.0, 0.1));
         (seen[5], seen[6]) = (Ring::default(), Ring::default());
         assert_eq!(of_layer(seen).distance_m, 0.0);
-        // It believes its own eyes, though.
-        seen = [Ring::default(); ALL];
-        seen[3] = ring(10.0, 0.1);
-        assert_eq!(of_layer(seen).level_m, 0.1);
+        // It believes its own eyes, though, but for a rise.
+        for (level_m, believed_m) in [(0.1, 0.1), (-0.8, -0.8), (0.5, 0.0)] {
+            seen = [Ring::default(); ALL];
+            seen[3] = ring(10.0, level_m);
+            assert_eq!(of_layer(seen).level_m, believed_m);
+        }
     }
 }
