@@ -7,6 +7,8 @@ use super::scenario::{Class, Load, Variant};
 use super::solid::{Fabric, Shape, Solid, block, extruded};
 
 const RUBBER: f64 = 0.08;
+/// Trailers are higher.
+const HIGHEST_BUS_M: f64 = 3.35;
 const CLOTH: f64 = 0.35;
 
 /// The solids of a road user after it has gone `travelled_m`.
@@ -137,12 +139,14 @@ fn car(variant: &Variant) -> Vec<Solid> {
     parts
 }
 
-/// A bus where it is long, else a lorry with a cab and a box.
+/// A bus where it is long and low, else a lorry with a cab and a box, or with a semi-trailer where it is long.
 fn truck(variant: &Variant) -> Vec<Solid> {
     let [length_m, width_m, height_m] = variant.size_m;
     let (half_m, wide_m) = (0.5 * length_m, 0.5 * width_m);
     let paint = variant.reflectance;
-    let mut parts = if length_m > 10.0 {
+    let is_long = length_m > 10.0;
+    let is_bus = is_long && height_m < HIGHEST_BUS_M;
+    let mut parts = if is_bus {
         let lower = [
             [-half_m, 0.35],
             [half_m, 0.35],
@@ -174,24 +178,33 @@ fn truck(variant: &Variant) -> Vec<Solid> {
             [half_m - 0.35, 2.5],
             [half_m - 1.8, 2.6],
         ];
+        let (floor_m, gap_m) = if is_long { (1.15, 0.8) } else { (0.9, 0.1) };
+        let front_m = half_m - 1.8 - gap_m;
         vec![
             solid(rounded(&cab, wide_m - 0.1, 0.1), Fabric::Dense, paint),
             solid(
-                block([-half_m, -wide_m, 0.9], [half_m - 1.9, wide_m, height_m]),
+                block([-half_m, -wide_m, floor_m], [front_m, wide_m, height_m]),
                 Fabric::Dense,
                 0.6,
             ),
         ]
     };
-    let axle_m = 0.32 * length_m;
+    let axles_m = if is_long && !is_bus {
+        vec![
+            half_m - 1.0,
+            half_m - 4.2,
+            -half_m + 1.8,
+            -half_m + 3.1,
+            -half_m + 4.4,
+        ]
+    } else {
+        vec![0.32 * length_m, -0.32 * length_m]
+    };
     let track_m = wide_m - 0.15;
-    for (u, v) in [
-        (axle_m, track_m),
-        (axle_m, -track_m),
-        (-axle_m, track_m),
-        (-axle_m, -track_m),
-    ] {
-        parts.push(solid(wheel(u, v, 0.48, 0.28), Fabric::Dense, RUBBER));
+    for u in axles_m {
+        for v in [track_m, -track_m] {
+            parts.push(solid(wheel(u, v, 0.48, 0.28), Fabric::Dense, RUBBER));
+        }
     }
     parts
 }

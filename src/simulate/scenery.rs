@@ -218,6 +218,17 @@ impl Scenery {
         self.pole(at_m, 0.04, 2.7)
     }
 
+    /// Something upright and dense between two heights, on whatever holds it.
+    pub(super) fn panel(
+        &mut self,
+        at_m: [f64; 2],
+        yaw_deg: f64,
+        sizes_m: [f64; 2],
+        heights_m: [f64; 2],
+    ) -> &mut Self {
+        self.bar(at_m, yaw_deg, sizes_m, heights_m, Fabric::Dense, 0.5)
+    }
+
     /// A pavement or an island: a kerb around level ground.
     pub(super) fn pavement(
         &mut self,

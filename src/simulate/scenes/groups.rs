@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::actor;
-use super::strangers::{along_the_street, between, person, stand_at_kerb};
+use super::strangers::{along_the_street, between, person, range_deviation_m, stand_at_kerb};
 use crate::random::Random;
 use crate::simulate::path::Path;
 use crate::simulate::scenario::{Actor, PoseMessages, Scene, Variant};
@@ -64,7 +64,7 @@ pub(super) fn groups(random: &mut Random) -> Scene {
         actors,
         scenery,
         terrain,
-        range_deviation_m: between(random, 0.008, 0.03),
+        range_deviation_m: range_deviation_m(random),
     }
 }
 

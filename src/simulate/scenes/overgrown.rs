@@ -1,6 +1,8 @@
 //! A street among gardens: what stands behind parked vehicles is ragged, close, and hangs over them.
 
-use super::strangers::{add_column, along_the_street, between, parked, pick, stand_at_kerb};
+use super::strangers::{
+    add_column, along_the_street, between, parked, pick, range_deviation_m, stand_at_kerb,
+};
 use crate::random::Random;
 use crate::simulate::scenario::{Actor, PoseMessages, Scene};
 use crate::simulate::scenery::Scenery;
@@ -64,7 +66,7 @@ pub(super) fn overgrown(random: &mut Random) -> Scene {
         actors,
         scenery,
         terrain,
-        range_deviation_m: between(random, 0.01, 0.04),
+        range_deviation_m: range_deviation_m(random),
     }
 }
 
@@ -86,10 +88,35 @@ pub(super) fn kerb(
             room_m = room_m.max(2.0 * (actor.path.at(0.0).position_m[1] - along_m) + 7.0);
             actors.push(actor);
         } else if random.uniform() < other_share {
-            stand_at_kerb(random, scenery, at_m);
+            match pick(random, &[0.2, 0.2]) {
+                Some(0) => board(random, scenery, at_m, side),
+                Some(1) => bed(random, scenery, at_m, side),
+                _ => stand_at_kerb(random, scenery, at_m),
+            }
         }
         along_m += room_m;
     }
+}
+
+/// A direction sign or an advertisement on two posts: as wide and as high as the rear of a vehicle.
+fn board(random: &mut Random, scenery: &mut Scenery, [x, y]: [f64; 2], side: f64) {
+    let low_m = between(random, 0.2, 2.8);
+    let heights_m = [low_m, low_m + between(random, 0.5, 2.2)];
+    let x = x + side * between(random, 0.0, 3.0);
+    let turn_deg = between(random, -25.0, 25.0);
+    let wide_m = between(random, 1.0, 3.8);
+    scenery.panel([x, y], turn_deg, [wide_m, 0.06], heights_m);
+    for off_m in [-0.35 * wide_m, 0.35 * wide_m] {
+        scenery.pole([x + off_m, y], 0.05, heights_m[1]);
+    }
+}
+
+/// A raised bed, the kerb of an island, a heap: as low as a bonnet or lower.
+fn bed(random: &mut Random, scenery: &mut Scenery, [x, y]: [f64; 2], side: f64) {
+    let sizes_m = [between(random, 0.6, 4.5), between(random, 0.4, 2.0)];
+    let at_m = [x + side * between(random, -0.5, 3.0), y];
+    let turn_deg = between(random, 0.0, 180.0);
+    scenery.cabinet(at_m, turn_deg, sizes_m, between(random, 0.12, 0.9));
 }
 
 /// What grows or stands along a stretch of a side, from a distance to the street's middle on.

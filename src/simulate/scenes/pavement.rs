@@ -2,7 +2,7 @@
 
 use super::actor;
 use super::overgrown::{KERB_M, front, hedge, kerb};
-use super::strangers::{along_the_street, between, person, pick};
+use super::strangers::{along_the_street, between, person, pick, range_deviation_m};
 use crate::random::Random;
 use crate::simulate::path::Path;
 use crate::simulate::scenario::{Actor, PoseMessages, Scene};
@@ -54,7 +54,7 @@ pub(super) fn pavement(random: &mut Random) -> Scene {
         actors,
         scenery,
         terrain,
-        range_deviation_m: between(random, 0.01, 0.04),
+        range_deviation_m: range_deviation_m(random),
     }
 }
 

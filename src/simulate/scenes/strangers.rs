@@ -10,6 +10,8 @@ use crate::simulate::terrain::{Swell, Terrain};
 
 /// How far the street reaches to the north and to the south.
 const REACH_M: [f64; 2] = [-30.0, 100.0];
+/// Longer lorries have a semi-trailer.
+const LONGEST_RIGID_M: f64 = 8.3;
 /// From the middle of the street to the middle of what stands at the kerb, behind the pavement, and
 /// behind that.
 const KERB_M: f64 = 4.7;
@@ -31,6 +33,12 @@ pub(super) fn furniture(random: &mut Random) -> Scene {
 /// Something between two bounds, all of it alike.
 pub(super) fn between(random: &mut Random, low: f64, high: f64) -> f64 {
     low + (high - low) * random.uniform()
+}
+
+/// How rough a sensor's ranges are: from those of a real VLP-16 to three times those of recordings that were cut from
+/// other sensors (`scripts/noise`).
+pub(super) fn range_deviation_m(random: &mut Random) -> f64 {
+    libm::exp(between(random, libm::log(0.004), libm::log(0.04)))
 }
 
 /// Which of so many shares chance picks; none if it lies beyond them all.
@@ -67,9 +75,14 @@ fn build(random: &mut Random, with_road_users: bool) -> Scene {
         let mut along_m = REACH_M[0];
         while along_m < REACH_M[1] {
             let at_m = [side * KERB_M, along_m];
-            let is_taken = with_road_users && random.uniform() < 0.4;
-            if is_taken {
-                actors.push(parked(random, at_m));
+            let mut room_m = BAY_M;
+            if with_road_users && random.uniform() < 0.4 {
+                let actor = parked(random, at_m);
+                let length_m = actor.variant.size_m[0];
+                if length_m > BAY_M - 0.7 {
+                    room_m = length_m + 3.5;
+                }
+                actors.push(actor);
             } else {
                 stand_at_kerb(random, &mut scenery, at_m);
             }
@@ -81,9 +94,7 @@ fn build(random: &mut Random, with_road_users: bool) -> Scene {
                 [side * BEHIND_M, along_m],
             );
             stand_far(random, &mut scenery, [side * FAR_M, along_m]);
-            // A long vehicle needs two bays.
-            let is_long = is_taken && actors.iter().any(|actor| is_long_near(actor, at_m));
-            along_m += if is_long { 13.0 } else { BAY_M };
+            along_m += room_m;
         }
     }
     let speed_mps = if random.uniform() < 0.4 {
@@ -107,7 +118,7 @@ fn build(random: &mut Random, with_road_users: bool) -> Scene {
         actors,
         scenery,
         terrain,
-        range_deviation_m: between(random, 0.008, 0.03),
+        range_deviation_m: range_deviation_m(random),
     }
 }
 
@@ -116,11 +127,6 @@ pub(super) fn along_the_street(speed_mps: f64) -> Path {
     Path::from([1.75, 0.0], 90.0)
         .line(400.0)
         .timed(&[(0.0, speed_mps), (100.0, speed_mps)])
-}
-
-fn is_long_near(actor: &Actor, [x, y]: [f64; 2]) -> bool {
-    let [actor_x, actor_y] = actor.path.at(0.0).position_m;
-    actor.variant.size_m[0] > 5.5 && actor_x == x && (actor_y - y).abs() < 5.0
 }
 
 /// A vehicle with paint and panes of its own.
@@ -134,12 +140,22 @@ fn vehicle(random: &mut Random, variant: Variant) -> Variant {
     }
 }
 
+/// A lorry: one in three with a semi-trailer.
 fn lorry(random: &mut Random) -> Variant {
-    let size_m = [
-        between(random, 5.8, 9.5),
-        between(random, 2.2, 2.5),
-        between(random, 2.5, 3.7),
-    ];
+    let length_m = between(random, 5.8, 9.5);
+    let size_m = if length_m < LONGEST_RIGID_M {
+        [
+            length_m,
+            between(random, 2.2, 2.5),
+            between(random, 2.5, 3.7),
+        ]
+    } else {
+        [
+            11.0 + 5.0 * (length_m - LONGEST_RIGID_M),
+            between(random, 2.45, 2.55),
+            between(random, 3.7, 4.0),
+        ]
+    };
     let own = Variant {
         size_m,
         ..Variant::lorry()
@@ -151,7 +167,10 @@ fn lorry(random: &mut Random) -> Variant {
 pub(super) fn parked(random: &mut Random, [x, y]: [f64; 2]) -> Actor {
     let (variant, y) = match pick(random, &[0.8, 0.12, 0.03]) {
         Some(0) => (Variant::car(random), y),
-        Some(1) => (lorry(random), y + 3.0),
+        Some(1) => {
+            let lorry = lorry(random);
+            (lorry, y + 0.5 * lorry.size_m[0] - 1.0)
+        }
         Some(2) => (Variant::bus(), y + 4.0),
         _ => (Variant::cyclist(random), y),
     };
@@ -186,7 +205,7 @@ pub(super) fn person(random: &mut Random) -> Variant {
 
 pub(super) fn stand_at_kerb(random: &mut Random, scenery: &mut Scenery, [x, y]: [f64; 2]) {
     let turn_deg = between(random, 0.0, 180.0);
-    match pick(random, &[0.12, 0.12, 0.1, 0.06, 0.06, 0.08, 0.05]) {
+    match pick(random, &[0.12, 0.12, 0.1, 0.06, 0.06, 0.08, 0.05, 0.15]) {
         Some(0) => {
             let radius_m = between(random, 0.05, 0.2);
             let high_m = between(random, 2.5, 7.0);
@@ -222,7 +241,26 @@ pub(super) fn stand_at_kerb(random: &mut Random, scenery: &mut Scenery, [x, y]: 
             let length_m = between(random, 1.5, 5.5);
             scenery.rail([x, y], 90.0, length_m);
         }
+        Some(7) => mast(random, scenery, [x, y]),
         _ => {}
+    }
+}
+
+/// Something slender with things on it: traffic lights, signs and boxes on a post, a young tree.
+fn mast(random: &mut Random, scenery: &mut Scenery, [x, y]: [f64; 2]) {
+    let radius_m = between(random, 0.03, 0.18);
+    let high_m = between(random, 1.2, 6.0);
+    scenery.pole([x, y], radius_m, high_m);
+    for _ in 0..1 + random.below(3) {
+        let at_m = [
+            x + between(random, -0.15, 0.15),
+            y + between(random, -0.15, 0.15),
+        ];
+        let turn_deg = between(random, 0.0, 180.0);
+        let sizes_m = [between(random, 0.15, 0.8), between(random, 0.04, 0.45)];
+        let low_m = between(random, 0.1, 2.6);
+        let heights_m = [low_m, low_m + between(random, 0.2, 1.2)];
+        scenery.panel(at_m, turn_deg, sizes_m, heights_m);
     }
 }
 
