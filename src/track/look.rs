@@ -26,9 +26,6 @@ pub(super) struct Look {
     pub(super) top_below_m: f64,
     /// Greatest extent of what is higher than a bonnet or a handlebar, if there is any of it.
     pub(super) upper_m: Option<f64>,
-    /// The same of what is lower than hips, if enough of it is met, below what is as narrow as a
-    /// person.
-    pub(super) lower_m: Option<f64>,
     /// Median jump of the range between neighbouring returns of a layer.
     pub(super) roughness_m: f64,
     /// Share of its columns in which it goes on above.
@@ -48,6 +45,8 @@ pub(super) struct Look {
     pub(super) old: f64,
     /// Rays pass to the left and to the right: across the line of sight it is all of it.
     pub(super) is_apart: bool,
+    /// How much likelier it is to be seen of somebody on foot than of anything else, if that is known.
+    pub(super) person_log: Option<f64>,
 }
 
 /// What begins higher has lost its wheels and bumpers to the ground, or between two layers.
@@ -57,11 +56,6 @@ const LOW_SHARE: f64 = 0.15;
 /// Bonnets and handlebars are lower, and a few returns show something above them.
 const UPPER_M: f32 = 1.1;
 const FEWEST_UPPER: usize = 2;
-/// Hips and the lower edges of signs are higher; of legs, two returns may be one. Shoulders are
-/// narrower.
-const LOWER_M: f32 = 0.8;
-const SHOULDERS_M: f64 = 1.0;
-const FEWEST_LOWER: usize = 3;
 /// A nearer return by this much beside an object hides a part of it.
 const OCCLUDER_M: f64 = 0.7;
 /// Columns beside an object that are looked at.
@@ -94,7 +88,7 @@ impl Look {
         let range_m = sight_m.norm();
         let top_m = f64::from(top_m);
         let top_below_m = passed_m(scan, top_point, top_m, range_m);
-        let upper_m = extent_m(spots, |above_m| above_m > UPPER_M, FEWEST_UPPER);
+        let upper_m = upper_m(spots);
         let returns_seen = |before: Seen| {
             let seen = spots.iter().filter(|spot| spot.before == before);
             seen.map(|spot| f64::from(spot.returns)).sum()
@@ -113,9 +107,6 @@ impl Look {
             top_m,
             top_below_m,
             upper_m,
-            lower_m: upper_m
-                .filter(|upper_m| *upper_m < SHOULDERS_M)
-                .and_then(|_| extent_m(spots, |above_m| above_m < LOWER_M, FEWEST_LOWER)),
             roughness_m: roughness_m(spots, scan),
             goes_on: columns.goes_on(),
             range_m,
@@ -126,6 +117,7 @@ impl Look {
             new: if is_upright { new } else { 0.0 },
             old: if is_upright { old } else { old + new },
             is_apart: false,
+            person_log: None,
         }
     }
 
@@ -261,12 +253,12 @@ fn cuts(layers: RangeInclusive<usize>, ends: [&Spot; 2], scan: &Scan) -> [bool; 
     })
 }
 
-/// Diagonal of the returns at some heights, if they are not too few.
-fn extent_m(spots: &[Spot], is_there: impl Fn(f32) -> bool, fewest: usize) -> Option<f64> {
+/// Diagonal of the returns above a bonnet or a handlebar, if they are not too few.
+fn upper_m(spots: &[Spot]) -> Option<f64> {
     let mut count = 0;
-    let there = spots.iter().filter(|spot| is_there(spot.above_m));
-    let [low_m, high_m] = bounds_m(there.inspect(|_| count += 1));
-    (count >= fewest).then(|| {
+    let upper = spots.iter().filter(|spot| spot.above_m > UPPER_M);
+    let [low_m, high_m] = bounds_m(upper.inspect(|_| count += 1));
+    (count >= FEWEST_UPPER).then(|| {
         let [along_m, across_m] = [0, 1].map(|axis| f64::from(high_m[axis] - low_m[axis]));
         libm::hypot(along_m, across_m)
     })
@@ -320,23 +312,6 @@ mod tests {
     use super::*;
     use crate::cloud::tests::scan_of;
     use crate::track::tests::spots_of;
-
-    #[test]
-    fn legs_are_as_wide_as_they_are_met_below_shoulders_unless_too_little_of_them_is() {
-        // 10 m away layer 5 passes 1.04 m above the ground, and 4 and 3 0.69 and 0.34 m.
-        let lower_m = |columns: usize, shoulders: usize| {
-            let scan = scan_of(1800, |column, layer| match layer {
-                3..5 if (100..100 + columns).contains(&column) => 1000,
-                5..7 if (95..95 + shoulders).contains(&column) => 1000,
-                _ => 0,
-            });
-            let spots = spots_of(&scan);
-            Look::at(&spots, &scan, Vector2::zeros()).lower_m
-        };
-        let of_legs = lower_m(8, 16).unwrap_or_default();
-        assert!((of_legs - 0.28).abs() < 0.02, "{of_legs}");
-        assert_eq!((lower_m(1, 16), lower_m(8, 40)), (None, None));
-    }
 
     #[test]
     fn the_ends_of_a_group_are_its_outermost_columns_in_whatever_order_it_comes() {

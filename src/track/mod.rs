@@ -10,9 +10,11 @@
 //! is a `belief`, and by its `trail` whether it moves; `existence` says whether it is there at all, and
 //! `confidence` how often that is right; what stands and is hardly a road user rests most of the
 //! time, and one that was lost gets its id back (`road_user`). Vehicles that are `standing` are known by
-//! the looks of their clusters and by their places. `nearest` is the tracking of the thesis.
+//! the `appearance` of their clusters and by their places, and people by theirs. `nearest` is the tracking of the thesis.
 
 mod above;
+
+mod appearance;
 
 mod assignment;
 
@@ -82,8 +84,8 @@ mod view;
 
 use nalgebra::Vector2;
 
+pub use appearance::FEATURES as APPEARANCE_FEATURES;
 pub use class::Class;
-pub use standing::FEATURES as APPEARANCE_FEATURES;
 
 use crate::beams::Beams;
 use crate::cloud::{Extent, Scan};

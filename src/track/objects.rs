@@ -5,13 +5,14 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::Vector2;
 
+use super::appearance::FEATURES;
 use super::assignment::{Assigner, Candidate};
 use super::grouping::Grouping;
 use super::nearby::Places;
 use super::road_user::{GATE, Track};
 use super::sight::Sight;
 use super::spots::Spot;
-use super::standing::{FEATURES, Standing};
+use super::standing::Standing;
 use super::{Object, Scene, TrackParameters};
 use crate::cloud::Extent;
 use crate::cluster::Clusters;
@@ -441,7 +442,7 @@ mod tests {
 
     #[test]
     fn what_rests_keeps_what_lies_in_its_place_unseen() {
-        let (post, nothing) = (body(1000, 5), body(0, 0));
+        let (post, nothing) = (body(1000, 10), body(0, 0));
         let mut tracker = ObjectTracker::default();
         let mut looks = 0;
         for revolution in 0..30 {

@@ -20,6 +20,8 @@ pub(super) struct Shape {
     pub(super) whole: [f64; 2],
     pub(super) top_m: f64,
     pub(super) top_below_m: f64,
+    /// From how far away that was seen.
+    passed_range_m: f64,
     pub(super) floor_m: f64,
     /// Whether motion has shown which end is the front.
     pub(super) front_known: bool,
@@ -80,6 +82,7 @@ impl Shape {
             whole: [0.0; 2],
             top_m: look.top_m,
             top_below_m: look.top_below_m,
+            passed_range_m: look.range_m,
             floor_m: look.floor_m,
             front_known: false,
             lorry: 0.0,
@@ -163,17 +166,38 @@ impl Shape {
         }
         self.check_axes();
         self.floor_m = self.floor_m.min(look.floor_m);
-        if look.top_m > self.top_m {
-            self.top_m += TOP_UP * (look.top_m - self.top_m);
+        let top_m = self.believed_top_m(look);
+        if top_m > self.top_m {
+            self.top_m += TOP_UP * (top_m - self.top_m);
         } else if look.top_below_m < self.top_m {
             // A ray passed where it was thought to be: that was the crown of a tree.
             self.top_m += TOP_DOWN * (look.top_below_m - self.top_m);
         }
-        self.top_below_m = self.top_below_m.min(look.top_below_m).max(self.top_m);
+        let top_below_m = self.top_below_m.min(look.top_below_m).max(self.top_m);
+        if top_below_m != self.top_below_m {
+            (self.top_below_m, self.passed_range_m) = (top_below_m, look.range_m);
+        }
         if self.front_known {
             let Range { start, end } = LORRY_TOP_M;
             let fresh = ((self.top_m - start) / (end - start)).clamp(0.0, 1.0);
             self.lorry += LORRY * (fresh - self.lorry);
+        }
+    }
+
+    /// How high a look shows it to be. What drives does not grow on its way: over what passed it when it was clearly nearer
+    /// it rises only because the ground below it is less known.
+    fn believed_top_m(&self, look: &Look) -> f64 {
+        /// How much of the distance the ground may be off.
+        const GROUND_OFF: f64 = 0.01;
+        const FARTHER: f64 = 1.3;
+        let off_m = GROUND_OFF * (look.range_m + self.passed_range_m);
+        let may_be_ground = self.front_known
+            && look.range_m > FARTHER * self.passed_range_m
+            && look.top_m < self.top_below_m + off_m;
+        if may_be_ground {
+            look.top_m.min(self.top_below_m)
+        } else {
+            look.top_m
         }
     }
 

@@ -11,6 +11,7 @@ use std::ops::Range;
 
 use nalgebra::Vector2;
 
+use super::appearance::Eye;
 use super::claims::Claims;
 use super::forecast::Forecasts;
 use super::look::Look;
@@ -47,6 +48,9 @@ pub(super) struct Grouping {
     target: Vec<usize>,
     /// Group numbers of what was cut off structure, ascending.
     suspects: Vec<u32>,
+    /// Looks at what may be people, by the points of each.
+    eye: Eye,
+    points: Vec<u32>,
 }
 
 /// Spots side by side that belong to one group.
@@ -167,6 +171,7 @@ impl Grouping {
                 ] => self.former[*place].look,
                 _ => Look {
                     is_apart: self.are_apart.get(number as usize) == Some(&true),
+                    person_log: person_log(&mut self.eye, &mut self.points, spots, scene),
                     ..Look::at(spots, scene.scan, sensor_m)
                 },
             };
@@ -180,6 +185,28 @@ impl Grouping {
         }
         std::mem::swap(&mut self.spots, &mut self.sorted);
     }
+}
+
+/// How much likelier what is as near and as small as the people that the network was fitted to is one of them than anything
+/// else.
+fn person_log(
+    eye: &mut Eye,
+    points: &mut Vec<u32>,
+    spots: &[Spot],
+    scene: &Scene<'_>,
+) -> Option<f64> {
+    const FARTHEST_M: f32 = 30.0;
+    const LONGEST_M: f32 = 1.8;
+    let [low_m, high_m] = bounds_m(spots.iter());
+    let diagonal_m = libm::hypotf(high_m[0] - low_m[0], high_m[1] - low_m[1]);
+    if diagonal_m > LONGEST_M || libm::hypotf(low_m[0], low_m[1]) > FARTHEST_M {
+        return None;
+    }
+    points.clear();
+    points.extend(spots.iter().map(|spot| spot.point));
+    points.sort_unstable();
+    let appearance = eye.look(points, scene)?;
+    Some(appearance.person_log_ratio())
 }
 
 #[cfg(test)]
@@ -234,6 +261,19 @@ mod tests {
                 (5, vec![100, 101, 108, 109, 110, 111])
             ]
         );
+    }
+
+    #[test]
+    fn only_what_is_as_near_and_as_small_as_people_is_looked_at_as_one_of_them() {
+        let looked_at = |columns: Range<usize>, range_cm: u16| {
+            let scan = scan_of(1800, |_, layer| if layer == 7 { range_cm } else { 0 });
+            let grouping = grouping(&scan, &[(columns, 3)]);
+            grouping.groups()[0].look.person_log.is_some()
+        };
+        assert!(looked_at(100..116, 1000));
+        assert!(!looked_at(100..170, 1000), "too wide");
+        assert!(!looked_at(100..106, 3500), "too far");
+        assert!(!looked_at(100..104, 1000), "too few");
     }
 
     #[test]

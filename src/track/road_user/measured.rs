@@ -60,7 +60,6 @@ impl Track {
         self.existence.see();
         self.last_measured = seen_at;
         self.is_hidden = false;
-        self.is_cut = look.is_cut != [false; 2];
         self.points = look.points;
         self.usual_points += 0.2 * (look.points as f64 - self.usual_points);
         self.range_m = look.range_m;
@@ -72,9 +71,9 @@ impl Track {
             let gain = if fresh_m > *known_m { 0.3 } else { 0.05 };
             *known_m += gain * (fresh_m - *known_m);
         }
-        if let Some(fresh_m) = look.lower_m {
-            let known_m = self.lower_m.get_or_insert(fresh_m);
-            *known_m += 0.2 * (fresh_m - *known_m);
+        if let Some(fresh) = look.person_log {
+            let known = self.person_log.get_or_insert(fresh);
+            *known += 0.3 * (fresh - *known);
         }
         self.newness.learn(look);
         self.trace.push(seen_at, self.motion.estimate().position_m);
@@ -207,7 +206,7 @@ impl Track {
             short_m: length_m.min(width_m),
             across_m: self.shape.front_known.then_some(width_m),
             upper_m: self.upper_m,
-            lower_m: self.lower_m,
+            person_log: self.person_log,
             top_m: self.shape.top_m,
             top_below_m: self.shape.top_below_m,
             goes_on: self.goes_on,
@@ -221,7 +220,6 @@ impl Track {
             range_m: self.range_m,
             points: self.points,
             is_suspect: self.is_suspect,
-            is_cut: self.is_cut,
         }
     }
 }
@@ -341,6 +339,45 @@ mod tests {
         assert!(lorry.qualities().moved);
         assert!(!wall(|wall| wall.shape.seen_m[1] = 0.5).qualities().moved);
         assert!(!wall(|wall| wall.shape.top_m = 1.5).qualities().moved);
+    }
+
+    #[test]
+    fn what_a_ray_passed_over_when_it_was_near_is_no_higher_far_away_by_as_much_as_the_ground_may_be_off()
+     {
+        let scan = scan_of(1800, |column, layer| match column {
+            0..60 if (5..8).contains(&layer) => 2000,
+            _ => 0,
+        });
+        let spots = spots_of(&scan);
+        let of = |range_m: f64, top_m: f64, top_below_m: f64| Look {
+            range_m,
+            top_m,
+            top_below_m,
+            ..Look::at(&spots, &scan, Vector2::zeros())
+        };
+        let (mut outline, mut end) = (vec![], scan.time());
+        let track = Track::new(
+            0,
+            false,
+            &spots,
+            &of(15.0, 1.5, 1.9),
+            end,
+            0.0,
+            &mut outline,
+        );
+        let mut top_m = |front_known: bool, seen_m: f64| {
+            let mut track = track.clone();
+            track.shape.front_known = front_known;
+            for _ in 0..10 {
+                end = end + Span::from_seconds(0.1);
+                track.measure(&spots, &of(35.0, seen_m, 4.5), end, 0.0, &mut outline);
+            }
+            track.shape.top_m
+        };
+        assert!(top_m(true, 2.3) < 1.95);
+        // A lorry, and what was never seen to drive.
+        assert!(top_m(true, 3.6) > 3.4);
+        assert!(top_m(false, 2.3) > 2.2);
     }
 
     #[test]

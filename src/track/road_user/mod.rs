@@ -71,15 +71,14 @@ pub(super) struct Track {
     roughness_m: f64,
     goes_on: f64,
     upper_m: Option<f64>,
-    lower_m: Option<f64>,
+    /// How much likelier its looks of late are those of somebody on foot than of anything else.
+    person_log: Option<f64>,
     speed_mps: f64,
     /// Whether it was seen to move, and how far.
     moves: bool,
     travelled_m: f64,
     newness: Newness,
     is_suspect: bool,
-    /// Whether something nearer hides what is beside it.
-    is_cut: bool,
     /// Where it was first seen, since its frame is the same.
     born_m: Vector2<f64>,
     trails: Trails,
@@ -129,13 +128,12 @@ impl Track {
             roughness_m: look.roughness_m,
             goes_on: look.goes_on,
             upper_m: look.upper_m,
-            lower_m: look.lower_m,
+            person_log: look.person_log,
             speed_mps: 0.0,
             moves: false,
             travelled_m: 0.0,
             newness: Newness::of(look),
             is_suspect,
-            is_cut: look.is_cut != [false; 2],
             born_m: look.middle_m,
             trails: Trails::default(),
             trace: Trace::default(),

@@ -1,23 +1,17 @@
 //! Vehicles that stand, each remembered by its place.
 //!
 //! What stands is told by its looks alone, and the place where it stands is all that must be known to
-//! recognise it. So a cluster is judged as DBSCAN gives it (`appearance`, by a small network whose
-//! `weights` are fitted), and belongs to the `candidate` in whose place it lies, whose `sides` all looks
-//! together show. What moves there takes the candidate's identity over, and a vehicle that came to rest
-//! gives it back.
-
-mod appearance;
+//! recognise it. So a cluster is judged as DBSCAN gives it, by its appearance, and belongs to the
+//! `candidate` in whose place it lies, whose `sides` all looks together show. What moves there takes
+//! the candidate's identity over, and a vehicle that came to rest gives it back.
 
 mod candidate;
 
 mod sides;
 
-mod weights;
-
-pub use appearance::FEATURES;
-
 use nalgebra::Vector2;
 
+use super::appearance::{Appearance, Eye, FEATURES};
 use super::look::Look;
 use super::nearby::Places;
 use super::objects::floor_z_m;
@@ -30,7 +24,6 @@ use crate::cluster::Clusters;
 use crate::ego::wrapped_rad;
 use crate::geometry::Rectangle;
 use crate::time::Time;
-use appearance::{Appearance, Eye};
 use candidate::{Candidate, LEAST_LOG, Sighting, may_begin};
 
 /// Everything that stands and may be a vehicle.
@@ -358,13 +351,13 @@ fn is_one_place(one: &Rectangle, other: &Rectangle) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::appearance::tests::{Block, CAR, scan_of_blocks};
     use super::*;
     use crate::cloud::Scan;
     use crate::cloud::tests::later;
     use crate::cluster::{ClusterParameters, Dbscan};
     use crate::parameter::Profile;
     use crate::track::Class;
+    use crate::track::appearance::tests::{Block, CAR, scan_of_blocks};
     use crate::track::tests::with_scene;
 
     struct Street {

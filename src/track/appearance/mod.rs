@@ -1,10 +1,13 @@
-//! What a cluster looks like in one revolution: a dozen numbers and a height map of it, which tell vehicles from the rest.
+//! What a cluster looks like in one revolution: a dozen numbers and a height map of it, by which one network tells vehicles
+//! from the rest and another one people. Their weights are fitted.
 
-use super::weights::{BIAS, HIDDEN};
+mod person;
+mod vehicle;
+
+use super::Scene;
+use super::look::{jump_m, median_jump_m, passed_m};
 use crate::cloud::MAX_LAYERS;
 use crate::geometry::{Rectangle, turned};
-use crate::track::Scene;
-use crate::track::look::{jump_m, median_jump_m, passed_m};
 
 /// How many numbers tell what a cluster looks like: sizes, heights and what is around it, and then its height map.
 pub const FEATURES: usize = QUALITIES + CELLS[0] * CELLS[1];
@@ -142,17 +145,47 @@ impl Appearance {
     /// Logarithm of the odds that this is a vehicle, had as many been vehicles as where the network
     /// was fitted.
     pub(super) fn vehicle_log_odds(&self) -> f64 {
-        let mut inner: [f64; HIDDEN.len()] = std::array::from_fn(|unit| HIDDEN[unit].1);
+        vehicle::NETWORK.log_odds(&self.features)
+    }
+
+    /// Logarithm of how much likelier this is to be seen of somebody on foot than of anything else.
+    pub(super) fn person_log_ratio(&self) -> f64 {
+        person::NETWORK.log_odds(&self.features) - person::NETWORK.log_prior
+    }
+}
+
+/// Hidden units of a network.
+const UNITS: usize = 16;
+
+/// A network of one hidden layer.
+struct Network {
+    units: &'static [Unit; UNITS],
+    bias: f64,
+    /// Logarithm of the odds before any look where it was fitted.
+    log_prior: f64,
+}
+
+/// A hidden unit: weights of the features, its bias, and its own weight.
+struct Unit {
+    weights: [f64; FEATURES],
+    bias: f64,
+    share: f64,
+}
+
+impl Network {
+    /// Logarithm of the odds that what looks like this is what the network was fitted to tell.
+    fn log_odds(&self, features: &[f64; FEATURES]) -> f64 {
+        let mut inner = self.units.each_ref().map(|unit| unit.bias);
         // Most cells of a height map are empty.
-        let known = self.features.iter().enumerate();
+        let known = features.iter().enumerate();
         for (number, feature) in known.filter(|(_, feature)| **feature != 0.0) {
-            for (sum, (weights, ..)) in inner.iter_mut().zip(&HIDDEN) {
-                *sum += weights[number] * feature;
+            for (sum, unit) in inner.iter_mut().zip(self.units) {
+                *sum += unit.weights[number] * feature;
             }
         }
-        let units = HIDDEN.iter().zip(inner);
-        units.fold(BIAS, |sum, ((_, _, share), inner)| {
-            sum + share * libm::tanh(inner)
+        let units = self.units.iter().zip(inner);
+        units.fold(self.bias, |sum, (unit, inner)| {
+            sum + unit.share * libm::tanh(inner)
         })
     }
 }
@@ -214,15 +247,15 @@ pub(super) mod tests {
 
     /// Upright walls around a place: where from the sensor, how far they reach to the right and ahead,
     /// and from which height above the ground to which.
-    #[derive(Clone, Copy)]
-    pub(in crate::track::standing) struct Block {
-        pub(in crate::track::standing) middle_m: [f64; 2],
-        pub(in crate::track::standing) sides_m: [f64; 2],
-        pub(in crate::track::standing) heights_m: [f64; 2],
+    #[derive(Debug, Clone, Copy)]
+    pub(in crate::track) struct Block {
+        pub(in crate::track) middle_m: [f64; 2],
+        pub(in crate::track) sides_m: [f64; 2],
+        pub(in crate::track) heights_m: [f64; 2],
     }
 
     /// A car 7 m ahead and 5 m to the right, or what else has such sizes.
-    pub(in crate::track::standing) const CAR: [Block; 2] = [
+    pub(in crate::track) const CAR: [Block; 2] = [
         Block {
             middle_m: [5.0, 7.0],
             sides_m: [1.75, 4.3],
@@ -236,7 +269,7 @@ pub(super) mod tests {
     ];
 
     /// What a sensor 1.9 m above the ground sees of some blocks.
-    pub(in crate::track::standing) fn scan_of_blocks(blocks: &[Block]) -> Scan {
+    pub(in crate::track) fn scan_of_blocks(blocks: &[Block]) -> Scan {
         scan_of(1800, |column, layer| {
             let azimuth_rad = (0.2 * column as f64).to_radians();
             let elevation_rad = (2.0 * layer as f64 - 15.0).to_radians();
@@ -260,7 +293,7 @@ pub(super) mod tests {
         })
     }
 
-    pub(in crate::track::standing) fn points(scan: &Scan) -> Vec<u32> {
+    pub(in crate::track) fn points(scan: &Scan) -> Vec<u32> {
         let all = 0..scan.len() as u32;
         all.filter(|point| scan.has_return(*point as usize))
             .collect()
@@ -334,6 +367,29 @@ pub(super) mod tests {
                 ..CAR[0]
             };
             assert!(odds(&[other]) < -1.0, "{sides_m:?} {}", odds(&[other]));
+        }
+    }
+
+    #[test]
+    fn somebody_who_stands_looks_like_a_person_and_a_post_a_board_and_a_car_do_not() {
+        let ratio = |blocks: &[Block]| look(&scan_of_blocks(blocks)).person_log_ratio();
+        let of = |sides_m, heights_m| Block {
+            sides_m,
+            heights_m,
+            ..CAR[0]
+        };
+        let legs = of([0.3, 0.25], [0.05, 0.85]);
+        let trunk = of([0.5, 0.3], [0.85, 1.5]);
+        let head = of([0.2, 0.2], [1.5, 1.75]);
+        assert!(
+            ratio(&[legs, trunk, head]) > 1.0,
+            "{}",
+            ratio(&[legs, trunk, head])
+        );
+        let post = of([0.1, 0.1], [0.0, 2.4]);
+        let board = of([1.2, 0.05], [0.9, 2.4]);
+        for other in [&[post][..], &[board], &CAR] {
+            assert!(ratio(other) < -0.5, "{other:?} {}", ratio(other));
         }
     }
 
