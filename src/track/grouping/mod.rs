@@ -187,7 +187,7 @@ impl Grouping {
     }
 }
 
-/// How much likelier what is as near and as small as the people that the network was fitted to is one of them than anything
+/// How much likelier what is as near and as small as the people of `scripts/fit-appearance` is one of them than anything
 /// else.
 fn person_log(
     eye: &mut Eye,
@@ -198,8 +198,10 @@ fn person_log(
     const FARTHEST_M: f32 = 30.0;
     const LONGEST_M: f32 = 1.8;
     let [low_m, high_m] = bounds_m(spots.iter());
-    let diagonal_m = libm::hypotf(high_m[0] - low_m[0], high_m[1] - low_m[1]);
-    if diagonal_m > LONGEST_M || libm::hypotf(low_m[0], low_m[1]) > FARTHEST_M {
+    let length_m = |[x, y]: [f32; 2]| libm::hypotf(x, y);
+    let diagonal_m = length_m([0, 1].map(|axis| high_m[axis] - low_m[axis]));
+    let range_m = length_m([0, 1].map(|axis| 0.5 * (low_m[axis] + high_m[axis])));
+    if diagonal_m > LONGEST_M || range_m > FARTHEST_M {
         return None;
     }
     points.clear();

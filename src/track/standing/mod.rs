@@ -64,7 +64,8 @@ struct Pair {
 
 /// Distance of a cluster's middle from the box of a candidate up to which it may belong to it.
 const BESIDE_M: f64 = 0.6;
-/// Farther away the network was not fitted.
+/// Farther away as much is wrong as right: up to 75 m 0.4 % more vehicles are found in the shared recording
+/// astyx_held_dev, and 0.15 objects a revolution more where none is.
 const FARTHEST_M: f64 = 50.0;
 /// There are no more vehicles within that distance; whatever else there is costs no more.
 const MOST_CANDIDATES: usize = 200;
