@@ -397,7 +397,7 @@ mod tests {
             top_below_m: OUT_OF_VIEW_M,
             range_m: 2.0,
             points: 700,
-            person_log: Some(2.5),
+            person_log: Some(1.8),
             ..CAR
         };
         let behind = Qualities {
