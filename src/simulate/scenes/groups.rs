@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use super::actor;
-use super::strangers::{along_the_street, between, person, range_deviation_m, stand_at_kerb};
+use super::chance::{between, person, range_deviation_m, stand_at_kerb};
+use super::strangers::along_the_street;
 use crate::random::Random;
 use crate::simulate::path::Path;
 use crate::simulate::scenario::{Actor, PoseMessages, Scene, Variant};

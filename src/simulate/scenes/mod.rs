@@ -1,5 +1,6 @@
 //! The scenes themselves. Traffic drives on the right; x is east, y north.
 
+mod chance;
 mod groups;
 mod overgrown;
 mod passage;

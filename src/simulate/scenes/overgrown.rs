@@ -1,8 +1,7 @@
 //! A street among gardens: what stands behind parked vehicles is ragged, close, and hangs over them.
 
-use super::strangers::{
-    add_column, along_the_street, between, parked, pick, range_deviation_m, stand_at_kerb,
-};
+use super::chance::{between, parked, pick, range_deviation_m, stand_at_kerb};
+use super::strangers::{add_column, along_the_street};
 use crate::random::Random;
 use crate::simulate::scenario::{Actor, PoseMessages, Scene};
 use crate::simulate::scenery::Scenery;

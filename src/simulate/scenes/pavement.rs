@@ -1,8 +1,9 @@
 //! People who walk and wait close to the fronts of a street, before and behind parked vehicles.
 
 use super::actor;
+use super::chance::{between, person, pick, range_deviation_m};
 use super::overgrown::{KERB_M, front, hedge, kerb};
-use super::strangers::{along_the_street, between, person, pick, range_deviation_m};
+use super::strangers::along_the_street;
 use crate::random::Random;
 use crate::simulate::path::Path;
 use crate::simulate::scenario::{Actor, PoseMessages, Scene};
