@@ -105,6 +105,16 @@ impl Circle {
     }
 }
 
+/// Where the road of all lanes begins and ends.
+pub(super) fn road_edges_m(circles: &[Circle]) -> [f64; 2] {
+    let roads = circles
+        .iter()
+        .filter(|circle| circle.kind == LaneKind::Road);
+    roads.fold([f64::INFINITY, 0.0], |[inner_m, outer_m], road| {
+        [inner_m.min(road.inner_m), outer_m.max(road.outer_m)]
+    })
+}
+
 /// Length of an arm's lanes on the map, before the corner.
 const ARM_M: f64 = 60.0;
 /// Headings of the ways in.

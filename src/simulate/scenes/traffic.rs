@@ -1,6 +1,8 @@
 //! Roundabouts that cars pass in every way, before a vehicle that waits to enter.
 
-use super::passage::{Circle, HEADINGS_DEG, Passage, STEERING_M, roads};
+use std::f64::consts::TAU;
+
+use super::passage::{Circle, HEADINGS_DEG, Passage, STEERING_M, road_edges_m, roads};
 use super::roundabouts::SMALL_CIRCLES;
 use super::{LANE_M, RANGE_DEVIATION_M, SENSOR_M, about, actor};
 use crate::random::Random;
@@ -76,15 +78,15 @@ const APPROACH_MPS: f64 = 8.0;
 const APART_M: f64 = 7.0;
 
 pub(super) fn small(random: &mut Random) -> Scene {
-    scene(random, &[SMALL], Some(16.6), 20.5, 9)
+    scene(random, &[SMALL], &SMALL_CIRCLES, Some(16.6), 20.5, 9)
 }
 
 pub(super) fn two_lane(random: &mut Random) -> Scene {
-    scene(random, &TWO_LANE, Some(22.6), 26.5, 13)
+    scene(random, &TWO_LANE, &TWO_LANE_CIRCLES, Some(22.6), 26.5, 13)
 }
 
 pub(super) fn mini(random: &mut Random) -> Scene {
-    scene(random, &[MINI], None, 11.5, 8)
+    scene(random, &[MINI], &MINI_CIRCLES, None, 11.5, 8)
 }
 
 pub(super) fn mini_entry(random: &mut Random) -> Scene {
@@ -127,6 +129,7 @@ fn entering(scene: Scene, passage: &Passage, random: &mut Random) -> Scene {
 fn scene(
     random: &mut Random,
     passages: &[Passage],
+    circles: &[Circle],
     bikeway_m: Option<f64>,
     pavement_m: f64,
     cars: usize,
@@ -178,7 +181,7 @@ fn scene(
         ego,
         poses: PoseMessages::Applanix,
         actors,
-        scenery: scenery(random, &outermost, pavement_m),
+        scenery: scenery(random, passages, circles, pavement_m),
         terrain: Terrain {
             swells: vec![],
             unevenness_m: 0.02,
@@ -222,32 +225,64 @@ fn admit(actors: &mut Vec<Actor>, ego: &Path, newcomer: Actor, apart_m: f64) -> 
     is_clear
 }
 
-/// Corners that differ from seed to seed.
-fn scenery(random: &mut Random, passage: &Passage, pavement_m: f64) -> Scenery {
+/// Kerbs, and corners that differ from seed to seed.
+fn scenery(
+    random: &mut Random,
+    passages: &[Passage],
+    circles: &[Circle],
+    pavement_m: f64,
+) -> Scenery {
+    /// The middle of a mini roundabout is driven over.
+    const DRIVEN_OVER_M: f64 = 4.0;
     let mut scenery = Scenery::default();
-    let island_m = passage.radius_m - 4.0;
-    scenery.island(
-        passage.centre_m,
-        if island_m > 10.0 {
-            island_m - 4.0
-        } else {
-            island_m
-        },
-    );
-    // The middle of a mini roundabout is driven over.
-    if island_m > 3.0 {
+    let centre_m = passages.first().unwrap_or(&SMALL).centre_m;
+    let [island_m, edge_m] = road_edges_m(circles);
+    scenery.island(centre_m, island_m);
+    kerb(&mut scenery, passages, centre_m, edge_m);
+    if island_m > DRIVEN_OVER_M {
         scenery.bush(
-            passage.centre_m,
+            centre_m,
             1.5 + 2.0 * random.uniform(),
             0.5 + 0.8 * random.uniform(),
         );
     }
     for (east, north) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
-        let [x, y] = passage.centre_m;
+        let [x, y] = centre_m;
         let corner = |far_m: f64| [x + east * far_m, y + north * far_m];
         scenery.pole(corner(pavement_m + 1.0), 0.09, 6.0);
         scenery.tree(corner(pavement_m + 6.0 + 4.0 * random.uniform()), 1.8);
         scenery.house(corner(pavement_m + 22.0), 0.0, [14.0, 12.0], 7.0);
     }
     scenery
+}
+
+/// Stones around the circle's outer edge, but where somebody drives in or out.
+fn kerb(scenery: &mut Scenery, passages: &[Passage], centre_m: [f64; 2], edge_m: f64) {
+    const STONE_M: [f64; 2] = [1.2, 0.4];
+    /// From the middle of a car.
+    const CLEAR_M: f64 = 1.7;
+    let exits = passages
+        .iter()
+        .flat_map(|passage| [1, 2, 3].map(|exit| (passage, exit)));
+    let ways = exits.flat_map(|(passage, exit)| {
+        HEADINGS_DEG.map(|heading_deg| {
+            let way = passage.path(heading_deg, 0.0, exit);
+            way.points(0.0, way.length_m())
+        })
+    });
+    let driven_m = ways.flatten().collect::<Vec<_>>();
+    let middle_m = edge_m + STONE_M[1] / 2.0;
+    let stones = (TAU * middle_m / STONE_M[0]) as usize;
+    for stone in 0..stones {
+        let angle_rad = TAU * stone as f64 / stones as f64;
+        let (sine, cosine) = libm::sincos(angle_rad);
+        let at_m = [
+            centre_m[0] + middle_m * cosine,
+            centre_m[1] + middle_m * sine,
+        ];
+        let is_clear = |&[x, y]: &[f64; 2]| libm::hypot(x - at_m[0], y - at_m[1]) > CLEAR_M;
+        if driven_m.iter().all(is_clear) {
+            scenery.pavement(at_m, 90.0 + angle_rad.to_degrees(), STONE_M);
+        }
+    }
 }
