@@ -57,7 +57,7 @@ impl Polyline {
     }
 
     /// Whether the box around it comes so near to a place.
-    pub(super) fn comes_within(&self, at_m: [f64; 2], reach_m: f64) -> bool {
+    pub(crate) fn comes_within(&self, at_m: [f64; 2], reach_m: f64) -> bool {
         let [low_m, high_m] = self.extent_m;
         (0..2).all(|axis| low_m[axis] - reach_m < at_m[axis] && at_m[axis] < high_m[axis] + reach_m)
     }
@@ -138,23 +138,24 @@ impl Polyline {
     /// The place nearest to a point; nothing if there are not two points.
     pub fn nearest(&self, [x, y]: [f64; 2]) -> Option<Station> {
         let pieces = self.points_m.len().checked_sub(1)?;
-        let mut best: Option<Station> = None;
-        for piece in 0..pieces {
+        let beside = |piece: usize| {
             let [px, py] = self.points_m[piece];
             let [dx, dy] = self.direction(piece);
             let length_m = self.along_m[piece + 1] - self.along_m[piece];
             let on_m = ((x - px) * dx + (y - py) * dy).clamp(0.0, length_m);
-            let distance_m = libm::hypot(x - px - on_m * dx, y - py - on_m * dy);
-            if best.is_none_or(|best| distance_m < best.distance_m) {
-                best = Some(Station {
-                    along_m: self.along_m[piece] + on_m,
-                    offset_m: (y - py) * dx - (x - px) * dy,
-                    distance_m,
-                    heading_rad: libm::atan2(dy, dx),
-                });
-            }
-        }
-        best
+            let [off_x, off_y] = [x - px - on_m * dx, y - py - on_m * dy];
+            (off_x * off_x + off_y * off_y, piece, on_m)
+        };
+        let (square_m2, piece, on_m) =
+            (0..pieces).map(beside).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let [px, py] = self.points_m[piece];
+        let [dx, dy] = self.direction(piece);
+        Some(Station {
+            along_m: self.along_m[piece] + on_m,
+            offset_m: (y - py) * dx - (x - px) * dy,
+            distance_m: libm::sqrt(square_m2),
+            heading_rad: libm::atan2(dy, dx),
+        })
     }
 
     /// Unit vector of a piece; of the only point, east.
@@ -164,7 +165,7 @@ impl Polyline {
         else {
             return [1.0, 0.0];
         };
-        let length_m = libm::hypot(bx - ax, by - ay);
+        let length_m = self.along_m[piece + 1] - self.along_m[piece];
         [(bx - ax) / length_m, (by - ay) / length_m]
     }
 }

@@ -326,9 +326,13 @@ fn on_way(
     object: &Object,
 ) -> Option<Candidate> {
     const TURNS_M: f64 = 4.0;
-    let station = way.nearest([object.centre_m[0], object.centre_m[1]])?;
+    let [x, y, _] = object.centre_m;
+    let reach_m = 2.0 * width_m;
+    let station = way
+        .comes_within([x, y], reach_m)
+        .then(|| way.nearest([x, y]))??;
     // Before the beginning or behind the end it is another lane's.
-    if station.distance_m > 2.0 * width_m || station.distance_m > station.offset_m.abs() + 1.0 {
+    if station.distance_m > reach_m || station.distance_m > station.offset_m.abs() + 1.0 {
         return None;
     }
     let turned = (station.along_m / TURNS_M).clamp(0.0, 1.0);

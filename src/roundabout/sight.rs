@@ -46,16 +46,45 @@ impl Sight<'_> {
             points.iter().skip(every / 2).step_by(every)
         });
         let sampled = sampled.map(|&point| point as usize);
-        let members = self.clusters.members().iter().enumerate();
-        let loose = members.filter(|&(point, is_member)| !is_member && self.scan.has_return(point));
-        let all = sampled.chain(loose.map(|(point, _)| point));
-        let high = all.filter(|&point| HEIGHTS_M.contains(&self.heights_m[point]));
-        high.map(|point| {
-            let place = self
-                .sensor
-                .place(&self.scan.point_m(point).map(f64::from).into());
-            [place.x, place.y]
+        let sampled = sampled.filter(|&point| HEIGHTS_M.contains(&self.heights_m[point]));
+        let loose = self.loose(HEIGHTS_M);
+        sampled.chain(loose).map(|point| self.place_m(point))
+    }
+
+    /// Places of the local frame where the ground is seen, or what is hardly higher, and how high above a level plane: the
+    /// ground itself steps up at a kerb.
+    pub(super) fn ground_m(&self) -> impl Iterator<Item = ([f64; 2], f64)> {
+        const HEIGHTS_M: std::ops::Range<f32> = -0.3..0.35;
+        self.loose(HEIGHTS_M).map(|point| {
+            let point_m = self.scan.point_m(point).map(f64::from).into();
+            (self.place_m(point), self.ground.above_m(&point_m))
         })
+    }
+
+    /// Returns at these heights above the ground that are of no cluster.
+    fn loose(&self, wanted_m: std::ops::Range<f32>) -> impl Iterator<Item = usize> {
+        let columns = self.clusters.members().chunks(MAX_LAYERS);
+        let columns = columns.zip(self.heights_m.chunks(MAX_LAYERS));
+        let loose = columns
+            .enumerate()
+            .flat_map(move |(column, (members, heights_m))| {
+                // Most columns hold few: all layers at once is faster than one by one.
+                let mut layers = 0u32;
+                for (layer, (is_member, height_m)) in members.iter().zip(heights_m).enumerate() {
+                    let is_high = (*height_m >= wanted_m.start) & (*height_m < wanted_m.end);
+                    layers |= u32::from(!is_member & is_high) << layer;
+                }
+                let points = (0..MAX_LAYERS).filter(move |layer| layers >> layer & 1 == 1);
+                points.map(move |layer| column * MAX_LAYERS + layer)
+            });
+        loose.filter(|&point| self.scan.has_return(point))
+    }
+
+    /// Where a point is in the local frame.
+    fn place_m(&self, point: usize) -> [f64; 2] {
+        let point_m = self.scan.point_m(point).map(f64::from);
+        let place = self.sensor.place(&point_m.into());
+        [place.x, place.y]
     }
 
     /// Whether a ray reached a place of the local frame, a little above the ground.
