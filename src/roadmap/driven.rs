@@ -6,6 +6,7 @@ use std::f64::consts::PI;
 
 use super::arms::{access, arms};
 use super::circle::Circle;
+use super::edges::{Edges, lay_out};
 use super::polyline::distance_m;
 use super::rings::{
     Bend, Group, LEAST_COVERED, LEAST_SWEEP_RAD, OFF_CIRCLE_M, RADII_M, SAME_CENTRE_M,
@@ -31,10 +32,14 @@ pub struct DrivenRoundabout {
     /// How much speaks for it, below 1: the share of the way round that was driven, and how often. It is no calibrated
     /// probability.
     pub confidence: f64,
+    /// Radii at which the innermost and the outermost driver goes round.
+    pub driven_m: [f64; 2],
 }
 
 /// Less than this, all together, leads round no circle.
 const LEAST_SWEPT_RAD: f64 = 1.5 * PI;
+/// Who comes round so far, comes round: loop ramps end before where they began.
+const WHOLE_SHARE: f64 = 0.9;
 /// Directions of a way are told from points so many apart: measured places scatter.
 const APART: usize = 4;
 /// So much of it is looked at before and behind its turns.
@@ -72,8 +77,11 @@ fn turning(points_m: &[[f64; 2]]) -> Option<[usize; 2]> {
     (turned_rad / APART as f64 >= LEAST_SWEEP_RAD).then_some([first.saturating_sub(AROUND), to])
 }
 
-/// Roundabouts that ways lead round.
-pub fn driven_roundabouts(ways: &[DrivenWay]) -> Vec<DrivenRoundabout> {
+/// Roundabouts that ways lead round. `edges` are those that are seen of the road around a middle.
+pub fn driven_roundabouts(
+    ways: &[DrivenWay],
+    edges: impl Fn([f64; 2]) -> Edges,
+) -> Vec<DrivenRoundabout> {
     let bends = ways.iter().enumerate().flat_map(|(lane, way)| {
         way.bends.iter().cloned().map(move |mut bend| {
             bend.lane = lane;
@@ -85,13 +93,13 @@ pub fn driven_roundabouts(ways: &[DrivenWay]) -> Vec<DrivenRoundabout> {
     let groups = grouped(|lane| ways[lane].kind, bends);
     let mut found: Vec<DrivenRoundabout> = vec![];
     // How little cars went round may be, where others went round more.
-    for group in groups.iter().filter(|group| is_road(ways, group, PI / 2.0)) {
+    for group in groups.iter().filter(|group| is_road(ways, group, PI / 3.0)) {
         let centre_m = group.circle.centre_m;
         let is_known = |known: &DrivenRoundabout| {
             distance_m(known.roundabout.centre_m(), centre_m) < known.roundabout.outer_m()
         };
         if !found.iter().any(is_known) {
-            found.extend(around(ways, &groups, group));
+            found.extend(around(ways, &groups, group, &edges));
         }
     }
     found
@@ -108,7 +116,12 @@ fn kind(ways: &[DrivenWay], group: &Group) -> LaneKind {
 
 /// All that leads around the middle of a group, if it leads round: cyclists and people on foot, who go round outside of the
 /// cars, say so, too.
-fn around(ways: &[DrivenWay], groups: &[Group], first: &Group) -> Option<DrivenRoundabout> {
+fn around(
+    ways: &[DrivenWay],
+    groups: &[Group],
+    first: &Group,
+    edges: impl Fn([f64; 2]) -> Edges,
+) -> Option<DrivenRoundabout> {
     let is_clockwise = first.bends[0].sweep_rad < 0.0;
     let belongs = |group: &&Group| {
         let is_near = distance_m(group.circle.centre_m, first.circle.centre_m) < SAME_CENTRE_M;
@@ -143,7 +156,11 @@ fn around(ways: &[DrivenWay], groups: &[Group], first: &Group) -> Option<DrivenR
         .filter(|group| kind(ways, group) == LaneKind::Road)
         .collect();
     let mut rings = rings(ways, &members, centre_m);
-    set_widths(&mut rings);
+    let road_m = rings.iter().filter(|ring| ring.kind == LaneKind::Road);
+    let mut road_m = road_m.map(|ring| ring.circle.radius_m);
+    let inner_m = road_m.next()?;
+    let driven_m = [inner_m, road_m.next_back().unwrap_or(inner_m)];
+    lay_out(&mut rings, edges(centre_m));
     let off_m = |at_m: &[f64; 2]| circle.off_m(*at_m).abs();
     let mut roundabout = Roundabout {
         name: String::new(),
@@ -160,11 +177,16 @@ fn around(ways: &[DrivenWay], groups: &[Group], first: &Group) -> Option<DrivenR
         .rings
         .retain(|ring| ring.kind == LaneKind::Road || ring.circle.radius_m > outer_m);
     let (entries, exits) = accesses(ways, &roundabout, &roads);
+    // All come in at one place and leave at one place: a loop ramp.
+    if covered_share < WHOLE_SHARE && [entries.len(), exits.len()] == [1, 1] {
+        return None;
+    }
     roundabout.arms = arms(entries, exits, is_clockwise);
     Some(DrivenRoundabout {
         roundabout,
         // Each half turn halves what speaks against it.
         confidence: covered_share * (1.0 - libm::pow(0.5, swept_rad / PI)),
+        driven_m,
     })
 }
 
@@ -245,53 +267,6 @@ fn rings(ways: &[DrivenWay], groups: &[&Group], centre_m: [f64; 2]) -> Vec<Ring>
         is_marked: false,
     });
     rings.collect()
-}
-
-/// Nobody sees a lane's edges by who drives in its middle: lanes beside each other meet half way, and a single one is as
-/// wide as is built.
-fn set_widths(rings: &mut [Ring]) {
-    let roads = rings.iter().filter(|ring| ring.kind == LaneKind::Road);
-    let radii_m: Vec<f64> = roads.map(|ring| ring.circle.radius_m).collect();
-    for ring in rings {
-        let radius_m = ring.circle.radius_m;
-        let apart_m = radii_m.iter().map(|other_m| (other_m - radius_m).abs());
-        let nearest_m = apart_m
-            .filter(|apart_m| *apart_m > 0.0)
-            .fold(f64::INFINITY, f64::min);
-        ring.width_m = match ring.kind {
-            LaneKind::Road if nearest_m.is_finite() => nearest_m,
-            LaneKind::Road => built_width_m(radius_m),
-            kind => kind.usual_width_m(),
-        };
-    }
-}
-
-/// Width of a circular path of one lane by the radius of its middle. A mini roundabout's is 4 to 6 m wide; a small one's
-/// 9 m where its outer diameter is 26 m, 8 at 30, 7 at 35, 6.5 from 40 m on (FGSV 2006, "Merkblatt fuer die Anlage von
-/// Kreisverkehren").
-fn built_width_m(radius_m: f64) -> f64 {
-    /// Outer diameter and width.
-    const BUILT_M: [[f64; 2]; 6] = [
-        [13.0, 4.0],
-        [22.0, 6.0],
-        [26.0, 9.0],
-        [30.0, 8.0],
-        [35.0, 7.0],
-        [40.0, 6.5],
-    ];
-    let middle_m = |[diameter_m, width_m]: [f64; 2]| (diameter_m - width_m) / 2.0;
-    let mut pairs = BUILT_M.windows(2);
-    let between =
-        pairs.rfind(|pair| middle_m(pair[0]) <= radius_m && radius_m <= middle_m(pair[1]));
-    match between {
-        Some(pair) => {
-            let [low_m, high_m] = [middle_m(pair[0]), middle_m(pair[1])];
-            let share = (radius_m - low_m) / (high_m - low_m).max(1e-9);
-            pair[0][1] + share * (pair[1][1] - pair[0][1])
-        }
-        None if radius_m < middle_m(BUILT_M[0]) => BUILT_M[0][1],
-        None => BUILT_M[BUILT_M.len() - 1][1],
-    }
 }
 
 /// Where somebody came into the circle, and where somebody left it: of ways at one place the longest.
@@ -383,7 +358,7 @@ mod tests {
             round(LaneKind::Road, 19.0, 2.0, 3.5),
             round(LaneKind::Bikeway, 22.6, 1.0, 2.0),
         ];
-        let found = driven_roundabouts(&ways);
+        let found = driven_roundabouts(&ways, |_| Edges::default());
         assert_eq!(found.len(), 1);
         let rings = &found[0].roundabout.rings;
         for (ring, (kind, inner_m, outer_m)) in rings.iter().zip([
@@ -399,19 +374,42 @@ mod tests {
         assert!(!found[0].roundabout.is_clockwise);
     }
 
-    #[test]
-    fn one_who_turns_round_in_the_road_circles_nothing() {
-        let ways = [round(LaneKind::Road, 6.0, 0.0, PI)];
-        assert!(driven_roundabouts(&ways).is_empty());
+    /// Up a straight, three quarters round to the left, and away straight, across where they came from.
+    fn loop_ramp(shift_m: f64) -> DrivenWay {
+        let straight = (0..30).map(|step| [40.0 + shift_m, f64::from(step) - 30.0]);
+        let bent = (0..=188).map(|step| {
+            let (sine, cosine) = libm::sincos(f64::from(step) / 40.0);
+            [(40.0 + shift_m) * cosine, (40.0 + shift_m) * sine]
+        });
+        let away = (1..40).map(|step| [f64::from(step), -40.0 - shift_m]);
+        let points_m: Vec<[f64; 2]> = straight.chain(bent).chain(away).collect();
+        DrivenWay::new(LaneKind::Road, &points_m).unwrap()
     }
 
     #[test]
-    fn widths_are_as_built() {
-        for (radius_m, width_m) in [(3.0, 4.0), (8.0, 6.0), (8.5, 9.0), (11.0, 8.0), (30.0, 6.5)] {
-            assert!(
-                (built_width_m(radius_m) - width_m).abs() < 1e-9,
-                "{radius_m}"
-            );
-        }
+    fn a_loop_ramp_is_none() {
+        let ramp = [0.0, 0.3, -0.2].map(loop_ramp);
+        assert!(driven_roundabouts(&ramp, |_| Edges::default()).is_empty());
+        // Somebody who leaves elsewhere.
+        let round = [ramp.as_slice(), &[round_and_out()]].concat();
+        assert_eq!(driven_roundabouts(&round, |_| Edges::default()).len(), 1);
+    }
+
+    /// From the same straight half round, and out to the west.
+    fn round_and_out() -> DrivenWay {
+        let straight = (0..30).map(|step| [40.0, f64::from(step) - 30.0]);
+        let bent = (0..=125).map(|step| {
+            let (sine, cosine) = libm::sincos(f64::from(step) / 40.0);
+            [40.0 * cosine, 40.0 * sine]
+        });
+        let away = (1..40).map(|step| [-40.0, -f64::from(step)]);
+        let points_m: Vec<[f64; 2]> = straight.chain(bent).chain(away).collect();
+        DrivenWay::new(LaneKind::Road, &points_m).unwrap()
+    }
+
+    #[test]
+    fn one_who_turns_round_in_the_road_circles_nothing() {
+        let ways = [round(LaneKind::Road, 6.0, 0.0, PI)];
+        assert!(driven_roundabouts(&ways, |_| Edges::default()).is_empty());
     }
 }

@@ -3,11 +3,13 @@
 //! Numbers were set by reasoning, and tried with `scripts/evaluate-roundabouts --seeds 1-6`.
 
 use super::Situation;
+use super::kerbs::Kerbs;
 use super::lanes::course;
 use crate::ego::wrapped_rad;
 use crate::roadmap::{
-    Access, Arm, DrivenRoundabout, DrivenWay, LaneKind, driven_roundabouts, simplified,
+    Access, Arm, DrivenRoundabout, DrivenWay, Edges, LaneKind, driven_roundabouts, simplified,
 };
+use crate::time::Time;
 use crate::track::{Class, Object};
 
 /// Slower road users tell no way.
@@ -22,6 +24,8 @@ const GROWN: usize = 15;
 const LONGEST: usize = 240;
 /// Ways that are kept.
 const MOST_WAYS: usize = 48;
+/// Kerbs are looked at so often.
+const LOOK_S: f64 = 1.0;
 /// What is found with less confidence is not told.
 const LEAST_CONFIDENCE: f64 = 0.6;
 
@@ -33,6 +37,10 @@ pub(super) struct Finder {
     /// How many ways began.
     begun: u64,
     found: Vec<DrivenRoundabout>,
+    /// Around each.
+    kerbs: Vec<Kerbs>,
+    /// When kerbs were looked at last.
+    looked: Option<Time>,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -91,7 +99,33 @@ impl Finder {
                 self.extend(Who::Object(object.id), [x, y], kind);
             }
         }
-        self.look() && self.conclude()
+        let is_grown = self.look();
+        let is_seen = self.look_at_kerbs(situation);
+        (is_grown || is_seen) && self.conclude()
+    }
+
+    /// Takes in where the road ends around what was found. Gives whether something was to be seen.
+    fn look_at_kerbs(&mut self, situation: &Situation<'_>) -> bool {
+        let Some(sight) = situation.sight.as_ref().filter(|_| !self.found.is_empty()) else {
+            return false;
+        };
+        let passed_s = self
+            .looked
+            .map(|looked| (situation.time - looked).seconds());
+        if passed_s.is_some_and(|passed_s| (0.0..LOOK_S).contains(&passed_s)) {
+            return false;
+        }
+        self.looked = Some(situation.time);
+        let around = |found: &DrivenRoundabout| {
+            let centre_m = found.roundabout.centre_m();
+            let known = self.kerbs.iter().find(|kerbs| kerbs.is_at(centre_m));
+            let mut kerbs = known.cloned().unwrap_or_else(|| Kerbs::around(centre_m));
+            kerbs.note_driven(found.driven_m);
+            kerbs.take(sight);
+            kerbs
+        };
+        self.kerbs = self.found.iter().map(around).collect();
+        true
     }
 
     fn extend(&mut self, who: Who, at_m: [f64; 2], kind: LaneKind) {
@@ -143,7 +177,10 @@ impl Finder {
     fn conclude(&mut self) -> bool {
         let ways = self.trails.iter().filter_map(|trail| trail.way.clone());
         let ways: Vec<DrivenWay> = ways.collect();
-        let mut found = driven_roundabouts(&ways);
+        let mut found = driven_roundabouts(&ways, |centre_m| {
+            let kerbs = self.kerbs.iter().find(|kerbs| kerbs.is_at(centre_m));
+            kerbs.map_or(Edges::default(), Kerbs::edges)
+        });
         found.retain(|one| one.confidence >= LEAST_CONFIDENCE);
         for one in &mut found {
             one.roundabout = simplified(&one.roundabout).roundabout;
@@ -230,6 +267,7 @@ fn is_same(a: &DrivenRoundabout, b: &DrivenRoundabout) -> bool {
         && rings().all(|(a, b)| {
             a.kind == b.kind
                 && is_near(a.circle.radius_m, b.circle.radius_m)
+                && is_near(a.width_m, b.width_m)
                 && is_near(a.circle.centre_m[0], b.circle.centre_m[0])
                 && is_near(a.circle.centre_m[1], b.circle.centre_m[1])
         })

@@ -9,6 +9,7 @@ mod arms;
 mod bend;
 mod finder;
 mod gap;
+mod kerbs;
 mod lanes;
 mod leaving;
 mod on_lane;
