@@ -45,6 +45,19 @@ impl Bend {
             + bent_m / self.speed_mps
     }
 
+    /// How hard somebody brakes before it who is so fast now.
+    pub(super) fn braking_mps2(&self, speed_mps: f64) -> f64 {
+        /// Who needs less than this share of it rolls on.
+        const BEGINS_SHARE: f64 = 0.5;
+        let fall = speed_mps * speed_mps - self.speed_mps * self.speed_mps;
+        let needed_mps2 = fall / (2.0 * self.left_m);
+        if self.left_m > 0.0 && needed_mps2 >= BEGINS_SHARE * BRAKES_MPS2 {
+            needed_mps2.min(BRAKES_MPS2)
+        } else {
+            0.0
+        }
+    }
+
     /// How long so far takes him at least who comes so fast, if nobody drives through the bend faster.
     pub(super) fn soonest_s(&self, way_m: f64, speed_mps: f64) -> f64 {
         if self.left_m > 0.0 {

@@ -5,7 +5,7 @@
 use std::f64::consts::TAU;
 
 use super::RoundaboutParameters;
-use super::bend::{Bend, round_mps};
+use super::bend::Bend;
 use super::leaving::{MOUTH_M, still_there};
 use super::on_lane::{NEW_S, OnLane, Place};
 use super::site::{Conflict, Site};
@@ -241,18 +241,6 @@ fn way_to(
     }
 }
 
-/// The bend between somebody on a way in and a conflict point; elsewhere he is in it.
-fn bend_before(site: &Site, conflict: &Conflict, on: &OnLane) -> Bend {
-    let left_m = match on.place {
-        Place::Entry(arm, lane) => site.arms[arm].entries[lane].bend_m - on.along_m,
-        _ => 0.0,
-    };
-    Bend {
-        left_m,
-        speed_mps: round_mps(site.rings[conflict.ring].circle.radius_m),
-    }
-}
-
 /// How somebody comes to a conflict point.
 struct Approach {
     /// Left for his middle; negative behind the point.
@@ -293,7 +281,7 @@ impl Approach {
             fastest_mps: fastest_mps(&asked.site.rings[conflict.ring], asked.road_mps),
             road_mps: asked.road_mps,
             on_circle: matches!(on.place, Place::Ring(_)) && conflict.kind == LaneKind::Road,
-            bend: bend_before(asked.site, conflict, on),
+            bend: asked.site.bend_before(on),
             known_s: on.known_s,
             probability: probability * on.probability,
         })

@@ -115,12 +115,13 @@ impl Candidate {
 }
 
 impl Belief {
-    /// Takes in where a road user is now; gives the lanes that it may be on, the likeliest first.
+    /// Takes in where a road user is now, `passed_s` after the last time; gives the lanes that it may be on, the likeliest
+    /// first. His speed is that of `told_late_s` ago.
     pub(super) fn update(
         &mut self,
         site: &Site,
         object: &Object,
-        passed_s: f64,
+        [passed_s, told_late_s]: [f64; 2],
         candidates: &mut Vec<Candidate>,
         found: &mut Vec<OnLane>,
     ) {
@@ -133,7 +134,8 @@ impl Belief {
             return;
         }
         take_candidates(site, object, candidates);
-        let (_, speed_mps) = course(object);
+        let (_, told_mps) = course(object);
+        let speed_mps = (told_mps - told_late_s * self.braking_mps2(site, told_mps)).max(0.0);
         self.known_s += passed_s;
         // It takes a while before the tracker knows the speed of who is new.
         let settled = self.mean_speed_mps.filter(|_| self.known_s >= NEW_S);
@@ -159,21 +161,29 @@ impl Belief {
             let probability = candidate.weight / sum;
             self.lanes.push((candidate.on.place, probability));
             if probability >= LEAST_PROBABILITY {
+                // As far as it leads along the lane.
+                let along = |mps: f64| match told_mps > 0.0 {
+                    true => mps / told_mps * candidate.on.speed_mps,
+                    false => mps,
+                };
                 found.push(OnLane {
                     probability,
                     known_s: self.known_s,
                     came_in_by: self.came_in_by,
-                    mean_speed_mps: if speed_mps > 0.0 {
-                        mean_mps / speed_mps * candidate.on.speed_mps
-                    } else {
-                        mean_mps
-                    },
+                    speed_mps: along(speed_mps),
+                    mean_speed_mps: along(mean_mps),
                     ..candidate.on
                 });
             }
         }
         found.sort_unstable_by(|a, b| b.probability.total_cmp(&a.probability));
         self.last.clone_from(found);
+    }
+
+    /// How hard somebody brakes who comes along a way in.
+    fn braking_mps2(&self, site: &Site, speed_mps: f64) -> f64 {
+        let last = self.last.first();
+        last.map_or(0.0, |on| site.bend_before(on).braking_mps2(speed_mps))
     }
 
     /// How probable a lane is before it is known where somebody is now.

@@ -173,12 +173,12 @@ impl Own {
             let half_m = object.width_m / 2.0;
             let is_beside = station.distance_m > entry.width_m / 2.0 + half_m;
             let is_ahead = station.along_m + half_m > front_m;
-            // Who is on the circle has a window of his own.
+            // Who is on the circle has a window of his own, and who leaves it is gone.
             let is_before_circle = station.along_m < entry.way.length_m() - half_m;
             let is_crossing = user
                 .lanes
                 .first()
-                .is_some_and(|on| matches!(on.place, Place::Ring(_)));
+                .is_some_and(|on| matches!(on.place, Place::Ring(_) | Place::Exit(..)));
             let counts = !is_beside && is_ahead && is_before_circle && !is_crossing;
             counts.then_some((station.along_m, object.id))
         });

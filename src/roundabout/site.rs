@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::bend;
+use super::bend::{self, Bend, round_mps};
+use super::on_lane::{OnLane, Place};
 use crate::ego::geodesy::LocalFrame;
 use crate::ego::wrapped_rad;
 use crate::roadmap::{Access, DrivenRoundabout, LaneKind, Origin, Polyline, Ring, Roundabout};
@@ -216,6 +217,19 @@ impl Site {
         let roads = self.rings.iter().enumerate();
         let roads = roads.filter(|(_, ring)| ring.kind == LaneKind::Road);
         roads.map(|(index, _)| index).next_back()
+    }
+
+    /// The bend before somebody on a way in; elsewhere he is in it.
+    pub(super) fn bend_before(&self, on: &OnLane) -> Bend {
+        let left_m = match on.place {
+            Place::Entry(arm, lane) => self.arms[arm].entries[lane].bend_m - on.along_m,
+            _ => 0.0,
+        };
+        let outermost = self.outermost_road().map(|road| self.rings[road].circle);
+        Bend {
+            left_m,
+            speed_mps: outermost.map_or(f64::INFINITY, |circle| round_mps(circle.radius_m)),
+        }
     }
 
     /// A way that ends before the circle goes straight on to it.

@@ -13,8 +13,8 @@ use crate::track::Object;
 
 /// Who is listed within this of a place is who is there.
 const LISTED_M: f64 = 3.5;
-/// What is on a ring is within this share of its width: beside it kerbs, signs and bushes begin.
-const ON_RING: f64 = 0.8;
+/// What is on a lane is within this share of its width: beside it kerbs, signs and bushes begin.
+const ON_LANE: f64 = 0.8;
 /// Nobody on a cycle path or on foot comes faster out of where nothing is seen.
 const CYCLIST_MPS: f64 = 6.0;
 const WALKER_MPS: f64 = 2.0;
@@ -98,11 +98,14 @@ impl Unseen {
         }
         for at_m in sight.things_m() {
             for (ring, stretch) in site.rings.iter().zip(&mut self.rings) {
-                let is_on = ring.circle.off_m(at_m).abs() < ON_RING * ring.width_m / 2.0;
+                let is_on = ring.circle.off_m(at_m).abs() < ON_LANE * ring.width_m / 2.0;
                 if is_on && !is_listed(objects, at_m) {
                     let place = place_at(site, site.angle_rad(at_m), stretch.may_hold.len());
                     stretch.may_hold[place] = LOOKS;
                 }
+            }
+            for ((_, entry), stretch) in entries(site).zip(&mut self.ways) {
+                stretch.note_thing(entry, at_m, objects);
             }
         }
     }
@@ -239,6 +242,23 @@ impl Stretch {
                 self.may_hold[place] = self.may_hold[place].max(self.may_hold[place + 1]);
             }
             self.may_hold[count - 1] = self.may_hold[count - 1].max(first);
+        }
+    }
+
+    /// Somebody may be where something is on a way in that is not listed.
+    fn note_thing(&mut self, entry: &Entry, at_m: [f64; 2], objects: &[Object]) {
+        let half_m = ON_LANE * entry.width_m / 2.0;
+        let way = &entry.way;
+        let station = way.comes_within(at_m, half_m).then(|| way.nearest(at_m));
+        let Some(station) = station.flatten() else {
+            return;
+        };
+        let back = (way.length_m() - station.along_m) / APART_M;
+        if let Some(may_hold) = self.may_hold.get_mut(back as usize)
+            && station.distance_m < half_m
+            && !is_listed(objects, at_m)
+        {
+            *may_hold = LOOKS;
         }
     }
 
