@@ -11,7 +11,7 @@ use super::{Situation, Watcher, Window};
 /// to (`scripts/evaluate-roundabouts --seeds 1-80`).
 pub(super) const CAUTION_S: f64 = 0.2;
 /// Who has only begun to watch has not seen everybody yet.
-const FIRST_LOOK_S: f64 = 1.5;
+const FIRST_LOOK_S: f64 = 2.0;
 
 impl Watcher {
     /// Says all that is told of a site, once it is known who is on which of its lanes.

@@ -194,8 +194,10 @@ fn way_to(
     // Behind the point by less than this is behind it, and not almost all the way round.
     let behind = |way_m: f64, radius_m: f64| {
         const BEHIND_M: f64 = 12.0;
-        if way_m > TAU * radius_m - BEHIND_M {
-            way_m - TAU * radius_m
+        const BEHIND_SHARE: f64 = 0.2;
+        let round_m = TAU * radius_m;
+        if way_m > round_m - BEHIND_M.min(BEHIND_SHARE * round_m) {
+            way_m - round_m
         } else {
             way_m
         }

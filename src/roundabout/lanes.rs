@@ -307,10 +307,11 @@ fn on_ring(site: &Site, index: usize, object: &Object) -> Option<Candidate> {
     // Who changes lanes goes round as fast as he goes, and who comes in will.
     let is_inward = libm::cos(course_rad - angle_rad) < 0.0;
     let goes_round = leads > if is_inward { 0.0 } else { LEADS };
-    let leads_mps = if ring.kind == LaneKind::Road && goes_round {
-        speed_mps
-    } else {
-        speed_mps * leads
+    let leads_mps = match ring.kind {
+        LaneKind::Road if goes_round => speed_mps,
+        // Nobody drives round against all others.
+        LaneKind::Road => (speed_mps * leads).max(0.0),
+        LaneKind::Bikeway | LaneKind::Pavement => speed_mps * leads,
     };
     let on = OnLane {
         place: Place::Ring(index),
