@@ -113,6 +113,20 @@ mod tests {
     }
 
     #[test]
+    fn who_is_near_the_bend_and_faster_brakes() {
+        let bend = |left_m| Bend {
+            left_m,
+            speed_mps: 5.0,
+        };
+        // From 8 m/s he has to begin 15 m before it.
+        assert_eq!(bend(40.0).braking_mps2(8.0), 0.0);
+        assert!((bend(15.0).braking_mps2(8.0) - 1.3).abs() < 1e-6);
+        assert_eq!(bend(2.0).braking_mps2(8.0), BRAKES_MPS2);
+        assert_eq!(bend(2.0).braking_mps2(4.0), 0.0);
+        assert_eq!(bend(0.0).braking_mps2(8.0), 0.0);
+    }
+
+    #[test]
     fn who_is_slow_or_in_the_bend_goes_on_as_he_does() {
         let bend = Bend {
             left_m: 20.0,

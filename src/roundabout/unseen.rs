@@ -383,6 +383,24 @@ mod tests {
     }
 
     #[test]
+    fn what_is_on_a_way_in_and_not_listed_may_be_somebody() {
+        let site = site();
+        let (_, entry) = entries(&site).nth(1).unwrap();
+        let mut stretch = free(&site).ways.swap_remove(1);
+        let (at_m, heading_rad) = entry.way.at(entry.way.length_m() - 9.0);
+        let (sine, cosine) = libm::sincos(heading_rad);
+        // On the kerb.
+        let aside_m = [at_m[0] - 2.0 * sine, at_m[1] + 2.0 * cosine];
+        stretch.note_thing(entry, aside_m, &[]);
+        assert!(stretch.may_hold.iter().all(|&looks| looks == 0));
+        stretch.note_thing(entry, at_m, &[]);
+        assert_eq!(
+            stretch.may_hold.iter().position(|&looks| looks > 0),
+            Some(4)
+        );
+    }
+
+    #[test]
     fn who_was_hidden_moves_on_as_fast_as_anybody_may() {
         let mut stretch = Stretch {
             may_hold: vec![0, 0, 0, 0, 1],
