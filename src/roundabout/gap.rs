@@ -90,7 +90,7 @@ const DEVIATIONS_NEW: f64 = 2.0;
 const SLOW_MPS: f64 = 2.0;
 const STARTS_MPS2: f64 = 3.0;
 /// Drivers go round so many times as fast as most, or as slowly.
-const VARIES: f64 = 1.15;
+pub(super) const VARIES: f64 = 1.15;
 /// More does not count: whose place is not known at all is rather not there.
 const MOST_BLUR_M: f64 = 2.0;
 
@@ -345,7 +345,15 @@ impl Approach {
             begin_s = begin_s.min(if mean_mps < WAITS_MPS {
                 self.soonest_s(left_m, 0.0)
             } else {
+                // Along a way in nobody comes faster than others do, unless he is seen to.
+                let is_on_circle = self.bend.left_m <= 0.0;
+                let most_mps = if is_on_circle {
+                    f64::INFINITY
+                } else {
+                    self.road_mps
+                };
                 let faster_mps = mean_mps + DEVIATIONS_NEW * object.speed_deviation_mps;
+                let faster_mps = faster_mps.min(most_mps.max(mean_mps));
                 self.bend(VARIES).time_s(left_m, faster_mps)
             });
         }

@@ -4,8 +4,8 @@
 
 use std::f64::consts::TAU;
 
-use super::bend::{Bend, fastest_round_mps};
-use super::gap::{User, Users};
+use super::bend::{Bend, fastest_round_mps, round_mps};
+use super::gap::{User, Users, VARIES};
 use super::sight::Sight;
 use super::site::{Conflict, Entry, Site};
 use crate::roadmap::{LaneKind, Ring};
@@ -170,7 +170,8 @@ impl Unseen {
                 let ring = &site.rings[conflict.ring];
                 let bend = Bend {
                     left_m: back_m - (entry.way.length_m() - entry.bend_m),
-                    speed_mps: fastest_mps(ring, road_mps),
+                    // As of anybody who is seen there.
+                    speed_mps: road_mps.min(VARIES * round_mps(ring.circle.radius_m)),
                 };
                 let way_m = back_m + ring.circle.radius_m * round_rad;
                 soonest_s = soonest_s.min(bend.soonest_s(way_m, road_mps));
@@ -374,7 +375,7 @@ mod tests {
         let mut soonest_s: Vec<f64> = soonest_s.collect();
         soonest_s.sort_by(f64::total_cmp);
         // Ten places back, of which twelve metres are a bend, and a quarter of the circle from arm to arm, of a radius of 11 m.
-        let round_mps = fastest_round_mps(11.0);
+        let round_mps = VARIES * round_mps(11.0);
         for (quarters, said_s) in (1..4).zip(soonest_s) {
             let bent_m = 12.0 + 11.0 * TAU / 4.0 * f64::from(quarters);
             let due_s = (10.0 * APART_M - 12.0) / 8.0 + bent_m / round_mps;

@@ -74,6 +74,20 @@ fn who_has_just_come_into_view_slows_down_before_the_bend_too() {
 }
 
 #[test]
+fn a_newcomer_on_a_way_in_is_no_faster_than_the_road_allows_unless_he_is_seen_to_be() {
+    let begin_s = |speed_mps: f64, deviation_mps: f64| {
+        let mut watcher = known(&[]);
+        let mut object = coming(40.0, speed_mps, &watcher);
+        object.speed_deviation_mps = deviation_mps;
+        watcher.watch(&situation(std::slice::from_ref(&object)));
+        window(&watcher).begin_s
+    };
+    let road_mps = RoundaboutParameters::profile(Profile::Default).speed_mps;
+    assert!(begin_s(6.0, 3.0) > begin_s(road_mps, 0.0) - 0.5);
+    assert!(begin_s(road_mps + 4.0, 0.0) < begin_s(6.0, 3.0) - 0.2);
+}
+
+#[test]
 fn who_came_in_is_remembered_on_the_circle() {
     let mut watcher = who_saw(3.0, 6.0);
     let arm = match watcher.lanes[0][0].place {
