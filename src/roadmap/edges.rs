@@ -31,14 +31,21 @@ pub(super) fn lay_out(rings: &mut Vec<Ring>, edges: Edges) {
         1 => built_width_m(first_m) / 2.0,
         count => (last_m - first_m) / (count - 1) as f64 / 2.0,
     };
-    let road_m = [
-        edges.inner_m.unwrap_or(first_m - half_m),
-        edges.outer_m.unwrap_or(last_m + half_m),
+    let built_m = [first_m - half_m, last_m + half_m];
+    let [inner_m, outer_m] = [
+        edges.inner_m.unwrap_or(built_m[0]),
+        edges.outer_m.unwrap_or(built_m[1]),
     ];
-    let lanes_m = (driven_m.len()..=MOST_LANES).find_map(|count| lanes_m(&driven_m, road_m, count));
-    // What else steps up there is no edge of this road.
-    let lanes_m =
-        lanes_m.unwrap_or_else(|| between(&driven_m, [first_m - half_m, last_m + half_m]));
+    // What else steps up there is no edge of this road: one of both, or either.
+    let roads_m = [
+        [inner_m, outer_m],
+        [inner_m, built_m[1]],
+        [built_m[0], outer_m],
+    ];
+    let lanes_m = roads_m.into_iter().find_map(|road_m| {
+        (driven_m.len()..=MOST_LANES).find_map(|count| lanes_m(&driven_m, road_m, count))
+    });
+    let lanes_m = lanes_m.unwrap_or_else(|| between(&driven_m, built_m));
     let ring = roads[0];
     roads = lanes_m
         .iter()
@@ -169,8 +176,12 @@ mod tests {
             laid_out(&[15.0, 19.0], None, None),
             [[13.0, 17.0], [17.0, 21.0]]
         );
-        // A wall far outside is no edge.
+    }
+
+    #[test]
+    fn what_steps_up_far_from_the_road_is_no_edge_of_it() {
         assert_eq!(laid_out(&[11.0], None, Some(40.0)), [[7.0, 15.0]]);
+        assert_eq!(laid_out(&[11.0], Some(7.5), Some(40.0)), [[7.5, 15.0]]);
     }
 
     #[test]
