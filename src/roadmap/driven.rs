@@ -374,37 +374,33 @@ mod tests {
         assert!(!found[0].roundabout.is_clockwise);
     }
 
-    /// Up a straight, three quarters round to the left, and away straight, across where they came from.
-    fn loop_ramp(shift_m: f64) -> DrivenWay {
-        let straight = (0..30).map(|step| [40.0 + shift_m, f64::from(step) - 30.0]);
-        let bent = (0..=188).map(|step| {
-            let (sine, cosine) = libm::sincos(f64::from(step) / 40.0);
-            [(40.0 + shift_m) * cosine, (40.0 + shift_m) * sine]
+    /// Up a straight to the east of a circle, so far round it to the left, and straight away.
+    fn ramp(radius_m: f64, sweep_rad: f64) -> DrivenWay {
+        let straight = (0..30).map(|step| [radius_m, f64::from(step) - 30.0]);
+        let steps = (radius_m * sweep_rad) as u32;
+        let bent = (0..=steps).map(|step| {
+            let (sine, cosine) = libm::sincos(f64::from(step) / radius_m);
+            [radius_m * cosine, radius_m * sine]
         });
-        let away = (1..40).map(|step| [f64::from(step), -40.0 - shift_m]);
+        let (sine, cosine) = libm::sincos(sweep_rad);
+        let away = (1..40).map(|step| {
+            let gone_m = f64::from(step);
+            [
+                radius_m * cosine - gone_m * sine,
+                radius_m * sine + gone_m * cosine,
+            ]
+        });
         let points_m: Vec<[f64; 2]> = straight.chain(bent).chain(away).collect();
         DrivenWay::new(LaneKind::Road, &points_m).unwrap()
     }
 
     #[test]
     fn a_loop_ramp_is_none() {
-        let ramp = [0.0, 0.3, -0.2].map(loop_ramp);
-        assert!(driven_roundabouts(&ramp, |_| Edges::default()).is_empty());
+        let ways = [40.0, 40.3, 39.8].map(|radius_m| ramp(radius_m, 1.5 * PI));
+        assert!(driven_roundabouts(&ways, |_| Edges::default()).is_empty());
         // Somebody who leaves elsewhere.
-        let round = [ramp.as_slice(), &[round_and_out()]].concat();
+        let round = [ways.as_slice(), &[ramp(40.0, PI)]].concat();
         assert_eq!(driven_roundabouts(&round, |_| Edges::default()).len(), 1);
-    }
-
-    /// From the same straight half round, and out to the west.
-    fn round_and_out() -> DrivenWay {
-        let straight = (0..30).map(|step| [40.0, f64::from(step) - 30.0]);
-        let bent = (0..=125).map(|step| {
-            let (sine, cosine) = libm::sincos(f64::from(step) / 40.0);
-            [40.0 * cosine, 40.0 * sine]
-        });
-        let away = (1..40).map(|step| [-40.0, -f64::from(step)]);
-        let points_m: Vec<[f64; 2]> = straight.chain(bent).chain(away).collect();
-        DrivenWay::new(LaneKind::Road, &points_m).unwrap()
     }
 
     #[test]

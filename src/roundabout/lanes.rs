@@ -162,9 +162,12 @@ impl Belief {
             self.lanes.push((candidate.on.place, probability));
             if probability >= LEAST_PROBABILITY {
                 // As far as it leads along the lane.
-                let along = |mps: f64| match told_mps > 0.0 {
-                    true => mps / told_mps * candidate.on.speed_mps,
-                    false => mps,
+                let along = |mps: f64| {
+                    if told_mps > 0.0 {
+                        mps / told_mps * candidate.on.speed_mps
+                    } else {
+                        mps
+                    }
                 };
                 found.push(OnLane {
                     probability,

@@ -63,21 +63,16 @@ impl Sight<'_> {
 
     /// Returns at these heights above the ground that are of no cluster.
     fn loose(&self, wanted_m: std::ops::Range<f32>) -> impl Iterator<Item = usize> {
-        let columns = self.clusters.members().chunks(MAX_LAYERS);
-        let columns = columns.zip(self.heights_m.chunks(MAX_LAYERS));
-        let loose = columns
-            .enumerate()
-            .flat_map(move |(column, (members, heights_m))| {
-                // Most columns hold few: all layers at once is faster than one by one.
-                let mut layers = 0u32;
-                for (layer, (is_member, height_m)) in members.iter().zip(heights_m).enumerate() {
-                    let is_high = (*height_m >= wanted_m.start) & (*height_m < wanted_m.end);
-                    layers |= u32::from(!is_member & is_high) << layer;
-                }
-                let points = (0..MAX_LAYERS).filter(move |layer| layers >> layer & 1 == 1);
-                points.map(move |layer| column * MAX_LAYERS + layer)
-            });
-        loose.filter(|&point| self.scan.has_return(point))
+        let points = self
+            .clusters
+            .members()
+            .iter()
+            .zip(self.heights_m)
+            .enumerate();
+        let low = points
+            .filter(move |(_, (is_member, height_m))| !**is_member && wanted_m.contains(*height_m));
+        low.map(|(point, _)| point)
+            .filter(|&point| self.scan.has_return(point))
     }
 
     /// Where a point is in the local frame.

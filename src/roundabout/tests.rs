@@ -106,39 +106,6 @@ fn one_may_enter_where_nobody_is() {
     assert!((2.5..3.6).contains(&end_s), "{end_s}");
 }
 
-/// The window of the only road user at the vehicle's arm.
-fn own_window(watcher: &Watcher) -> Option<Window> {
-    let advice = watcher.advice().unwrap();
-    let mut windows = advice.windows.iter();
-    let is_own = |window: &&Window| Some(window.arm) == advice.own_arm && !window.at_exit;
-    windows.find(is_own).copied()
-}
-
-#[test]
-fn who_has_most_of_a_small_circle_before_him_comes() {
-    let mut watcher = watcher_at("mini-traffic");
-    let centre_m = [-1.75, 16.0];
-    let mut car = round(Class::Car, 6.1, 60.0, 5.0);
-    for axis in 0..2 {
-        car.centre_m[axis] += centre_m[axis] - CENTRE_M[axis];
-    }
-    watcher.watch(&situation(&[car]));
-    // Three quarters of it.
-    let window = own_window(&watcher).unwrap();
-    assert!((27.0..30.0).contains(&window.way_m), "{window:?}");
-}
-
-#[test]
-fn nobody_drives_round_the_other_way() {
-    let mut watcher = watcher();
-    let mut car = round(Class::Car, ROAD_M, 180.0, 6.0);
-    car.yaw_rad = crate::ego::wrapped_rad(car.yaw_rad + 2.0);
-    car.yaw_deviation_rad = 1.5;
-    watcher.watch(&situation(&[car]));
-    let window = own_window(&watcher).unwrap();
-    assert!((10.0..30.0).contains(&window.way_m), "{window:?}");
-}
-
 #[test]
 fn one_waits_for_who_comes_round() {
     let mut watcher = watcher();

@@ -37,7 +37,7 @@ fn who_saw_at(mut watcher: Watcher, left_m: f64, speed_mps: f64) -> Watcher {
     watcher
 }
 
-/// The car's window at the southern arm's way in.
+/// The only road user's window at the southern arm's way in.
 fn window(watcher: &Watcher) -> Window {
     let advice = watcher.advice().unwrap();
     let own = advice.own_arm.unwrap();
@@ -85,6 +85,31 @@ fn a_newcomer_on_a_way_in_is_no_faster_than_the_road_allows_unless_he_is_seen_to
     let road_mps = RoundaboutParameters::profile(Profile::Default).speed_mps;
     assert!(begin_s(6.0, 3.0) > begin_s(road_mps, 0.0) - 0.5);
     assert!(begin_s(road_mps + 4.0, 0.0) < begin_s(6.0, 3.0) - 0.2);
+}
+
+#[test]
+fn who_has_most_of_a_small_circle_before_him_comes() {
+    let mut watcher = watcher_at("mini-traffic");
+    let centre_m = [-1.75, 16.0];
+    let mut car = round(Class::Car, 6.1, 60.0, 5.0);
+    for axis in 0..2 {
+        car.centre_m[axis] += centre_m[axis] - CENTRE_M[axis];
+    }
+    watcher.watch(&situation(&[car]));
+    // Three quarters of it.
+    let window = window(&watcher);
+    assert!((27.0..30.0).contains(&window.way_m), "{window:?}");
+}
+
+#[test]
+fn nobody_drives_round_the_other_way() {
+    let mut watcher = watcher();
+    let mut car = round(Class::Car, ROAD_M, 180.0, 6.0);
+    car.yaw_rad = crate::ego::wrapped_rad(car.yaw_rad + 2.0);
+    car.yaw_deviation_rad = 1.5;
+    watcher.watch(&situation(&[car]));
+    let window = window(&watcher);
+    assert!((10.0..30.0).contains(&window.way_m), "{window:?}");
 }
 
 #[test]
