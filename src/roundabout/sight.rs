@@ -2,6 +2,8 @@
 //!
 //! Numbers without another source were set with `scripts/evaluate-roundabouts --seeds 1-8`.
 
+use std::ops::Range;
+
 use nalgebra::Vector3;
 
 use crate::cloud::{MAX_LAYERS, Scan};
@@ -40,7 +42,7 @@ impl Sight<'_> {
     pub(super) fn things_m(&self) -> impl Iterator<Item = [f64; 2]> {
         /// Of each cluster, whose points are in the order of their columns.
         const POINTS: usize = 5;
-        const HEIGHTS_M: std::ops::Range<f32> = 0.3..2.5;
+        const HEIGHTS_M: Range<f32> = 0.3..2.5;
         let sampled = self.clusters.iter().flat_map(|points| {
             let every = (points.len() / POINTS).max(1);
             points.iter().skip(every / 2).step_by(every)
@@ -54,7 +56,7 @@ impl Sight<'_> {
     /// Places of the local frame where the ground is seen, or what is hardly higher, and how high above a level plane: the
     /// ground itself steps up at a kerb.
     pub(super) fn ground_m(&self) -> impl Iterator<Item = ([f64; 2], f64)> {
-        const HEIGHTS_M: std::ops::Range<f32> = -0.3..0.35;
+        const HEIGHTS_M: Range<f32> = -0.3..0.35;
         self.loose(HEIGHTS_M).map(|point| {
             let point_m = self.scan.point_m(point).map(f64::from).into();
             (self.place_m(point), self.ground.above_m(&point_m))
@@ -62,17 +64,27 @@ impl Sight<'_> {
     }
 
     /// Returns at these heights above the ground that are of no cluster.
-    fn loose(&self, wanted_m: std::ops::Range<f32>) -> impl Iterator<Item = usize> {
-        let points = self
-            .clusters
-            .members()
-            .iter()
-            .zip(self.heights_m)
-            .enumerate();
-        let low = points
-            .filter(move |(_, (is_member, height_m))| !**is_member && wanted_m.contains(*height_m));
-        low.map(|(point, _)| point)
-            .filter(|&point| self.scan.has_return(point))
+    fn loose(&self, wanted_m: Range<f32>) -> impl Iterator<Item = usize> {
+        let (heights_m, _) = self.heights_m.as_chunks::<MAX_LAYERS>();
+        let (ranges_m, _) = self.scan.range_m().as_chunks::<MAX_LAYERS>();
+        let (members, _) = self.clusters.members().as_chunks::<MAX_LAYERS>();
+        let (from_m, to_m) = (wanted_m.start, wanted_m.end);
+        let is_loose = move |column: usize, layer: usize| {
+            let height_m = heights_m[column][layer];
+            let is_return = ranges_m[column][layer] > 0.0;
+            (height_m >= from_m) & (height_m < to_m) & is_return & !members[column][layer]
+        };
+        // Most columns have none: all layers of one are looked at at once.
+        let columns = heights_m.len().min(ranges_m.len()).min(members.len());
+        let has_some = move |&column: &usize| {
+            let layers = (0..MAX_LAYERS).map(|layer| u32::from(is_loose(column, layer)));
+            layers.fold(0, |some, is_loose| some | is_loose) > 0
+        };
+        let columns = (0..columns).filter(has_some);
+        columns.flat_map(move |column| {
+            let layers = (0..MAX_LAYERS).filter(move |&layer| is_loose(column, layer));
+            layers.map(move |layer| column * MAX_LAYERS + layer)
+        })
     }
 
     /// Where a point is in the local frame.
