@@ -6,10 +6,6 @@ use super::own::{Own, standing, standing_inside};
 use super::site::Site;
 use super::{Situation, Watcher, Window};
 
-/// What a gap must leave beyond the margin to be announced, where road users are seen and not known, and what it may
-/// lack of it later: what is hardly long enough is so by mistake as often as not, and who has been told to go has begun
-/// to (`scripts/evaluate-roundabouts --seeds 1-80`).
-pub(super) const CAUTION_S: f64 = 0.2;
 /// Who has only begun to watch has not seen everybody yet.
 const FIRST_LOOK_S: f64 = 2.0;
 
@@ -68,7 +64,7 @@ impl Watcher {
             stop_m: 0.0,
             road_mps: self.parameters.speed_mps,
             is_seen,
-            caution_s: self.caution_s(number, false, is_seen),
+            is_announced: self.is_announced(number, false),
         };
         let mut crossing = |asked: Asked<'_>, motion: &OwnMotion| {
             self.crossing(&asked, motion, users, situation, windows)
@@ -99,7 +95,7 @@ impl Watcher {
             let asked = Asked {
                 stop_m: waits.front_m,
                 at_exit: true,
-                caution_s: self.caution_s(number, true, is_seen),
+                is_announced: self.is_announced(number, true),
                 conflicts: &exit.conflicts,
                 width_m: exit.width_m,
                 ..asked
@@ -113,15 +109,10 @@ impl Watcher {
         }
     }
 
-    /// What a gap at a way in or out must leave beyond the margin.
-    pub(super) fn caution_s(&self, arm: usize, at_exit: bool, is_seen: bool) -> f64 {
+    /// Whether a gap was announced last at a way in or out.
+    pub(super) fn is_announced(&self, arm: usize, at_exit: bool) -> bool {
         let announced = self.announced.get(arm);
-        let is_announced = announced.is_some_and(|ways| ways[usize::from(at_exit)]);
-        match (is_seen, is_announced) {
-            (true, false) => CAUTION_S,
-            (true, true) => -CAUTION_S,
-            (false, _) => 0.0,
-        }
+        announced.is_some_and(|ways| ways[usize::from(at_exit)])
     }
 
     /// What is said of a way in or out.

@@ -5,6 +5,7 @@
 //! It advises, and is no safety function.
 
 mod advice;
+mod approach;
 mod arms;
 mod bend;
 mod finder;

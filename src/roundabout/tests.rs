@@ -1,11 +1,11 @@
 mod exits;
 mod found;
 mod hidden;
+mod kept;
 mod ways;
 
 use std::f64::consts::PI;
 
-use super::arms::CAUTION_S;
 use super::*;
 use crate::parameter::Profile;
 use crate::simulate::scenario;
@@ -216,18 +216,6 @@ fn who_is_on_a_way_in_comes_whichever_way_he_seems_to_be_turned() {
         assert_eq!(entry.hindrance, Some(Hindrance::RoadUser(7)), "{yaw_rad}");
         assert!(entry.gap_s < 6.5, "{yaw_rad} {entry:?}");
     }
-}
-
-#[test]
-fn a_gap_opens_with_caution_where_road_users_are_seen_and_stays_below_the_margin() {
-    let mut watcher = watcher();
-    assert_eq!(watcher.caution_s(1, false, false), 0.0);
-    assert_eq!(watcher.caution_s(1, false, true), CAUTION_S);
-    watcher.watch(&situation(&[]));
-    assert!(own_arm(&watcher).entry.may_go);
-    assert_eq!(watcher.caution_s(1, false, true), -CAUTION_S);
-    watcher.forget();
-    assert_eq!(watcher.caution_s(1, false, true), CAUTION_S);
 }
 
 /// Who has only just been seen may be faster than he seems, by as much as his speed may be off.

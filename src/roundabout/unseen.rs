@@ -4,8 +4,9 @@
 
 use std::f64::consts::TAU;
 
+use super::approach::VARIES;
 use super::bend::{Bend, fastest_round_mps, round_mps};
-use super::gap::{User, Users, VARIES};
+use super::gap::{User, Users};
 use super::sight::Sight;
 use super::site::{Conflict, Entry, Site};
 use crate::roadmap::{LaneKind, Ring};
