@@ -129,7 +129,7 @@ pub(super) struct Asked<'a> {
 /// enough is so by mistake as often as not (`scripts/evaluate-roundabouts --seeds 1-80`).
 pub(super) const CAUTION_S: f64 = 0.2;
 /// What it may lack of it later: who has been told to go has begun to. With 0.4 one announcement of 20 lasts until half a
-/// second of the margin is gone, with 0.1 one of 100.
+/// second of the margin is gone, with 0.1 one of 100 (the same, seeds 1-20).
 pub(super) const LACKS_S: f64 = 0.1;
 
 impl Asked<'_> {
