@@ -164,6 +164,17 @@ impl View {
             let part = (2.0 * slack_m).min(reach_m) / reach_m.max(1e-9);
             let [rear_m, front_m] = shares.map(|share| part * share * size_m[axis]);
             let edge_m = self.edge_m + rear_m;
+            // Of a side few layers may miss either end: what is seen ends there, and the car goes on.
+            let is_car_side = axis == 0
+                && self.is_side_on[0]
+                && drives
+                && !is_rider
+                && size_m[0] < LONGEST_WITH_BONNET_M;
+            let beyond_m: [f64; 2] = std::array::from_fn(|end| {
+                let most_m = (INSETS[end] * size_m[0]).min(2.0 * slack_m);
+                let told_m = [rear_m, front_m][end];
+                f64::from(is_car_side) * (most_m - told_m).max(0.0)
+            });
             // What drives out of sight is not seen up to its ends, whatever hides it.
             let is_piece =
                 axis == 0 && drives && self.is_side_on[0] && high - low < PIECE * size_m[axis];
@@ -186,8 +197,20 @@ impl View {
                         edge_m + 0.5 * missed_m,
                     )
                 }
-                (true, false) => (low - rear_m + half_m, libm::hypot(edge_m, unsure_m)),
-                (false, true) => (high + front_m - half_m, libm::hypot(edge_m, unsure_m)),
+                (true, false) => {
+                    let (at_m, more_m) = (low - rear_m + half_m, beyond_m[0]);
+                    (
+                        expected[axis].clamp(at_m - more_m, at_m),
+                        libm::hypot(edge_m + 0.5 * more_m, unsure_m),
+                    )
+                }
+                (false, true) => {
+                    let (at_m, more_m) = (high + front_m - half_m, beyond_m[1]);
+                    (
+                        expected[axis].clamp(at_m, at_m + more_m),
+                        libm::hypot(edge_m + 0.5 * more_m, unsure_m),
+                    )
+                }
                 (false, false) => {
                     let middle = 0.5 * (low + high);
                     (
@@ -251,6 +274,34 @@ mod tests {
         let (x_m, deviation_m) = centre_x_m(0.0, false);
         assert_eq!(x_m, centre_x_m(2.0, false).0);
         assert!(deviation_m < 0.3);
+    }
+
+    #[test]
+    fn a_car_may_go_on_beyond_the_end_of_its_side_that_is_seen() {
+        // 3 m of a side, 20 m away, of which something nearer hides the right end.
+        let scan = scan_of(1800, |column, layer| match column {
+            0..43 if (5..8).contains(&layer) => 2000,
+            43..60 if (3..12).contains(&layer) => 700,
+            _ => 0,
+        });
+        let mut spots = spots_of(&scan);
+        spots.retain(|spot| spot.at_m[1] > 15.0);
+        let look = Look::at(&spots, &scan, Vector2::zeros());
+        let centre_x_m = |yaw_rad: f64, expected_x_m: f64, drives: bool| {
+            let view = View::of(&look, &spots, yaw_rad);
+            let expected_m = Vector2::new(expected_x_m, 20.9);
+            view.centre([4.3, 1.8], [0.1; 2], expected_m, 0.0, drives)
+                .0
+                .x
+        };
+        // Its left end is the rear, and then the front with the bonnet.
+        for (yaw_rad, beyond_m) in [(0.0, 0.3), (std::f64::consts::PI, 1.2)] {
+            let seen_x_m = centre_x_m(yaw_rad, 0.0, false);
+            let expected_x_m = |more_m: f64| centre_x_m(yaw_rad, seen_x_m - more_m, true);
+            assert!((expected_x_m(beyond_m) - (seen_x_m - beyond_m)).abs() < 1e-6);
+            assert!(expected_x_m(beyond_m + 1.0) > seen_x_m - beyond_m - 0.2);
+            assert!((expected_x_m(-0.5) - seen_x_m).abs() < 1e-6);
+        }
     }
 
     #[test]
