@@ -129,97 +129,14 @@ impl View {
         yaw_variance: f64,
         drives: bool,
     ) -> (Vector2<f64>, Matrix2<f64>) {
-        /// Share of what is missing below a cabin by which its middle is off the vehicle's.
-        const UPPER: f64 = 0.4;
-        /// Share of the length that reaches out below a cabin where the front is known, behind it and before it: in a
-        /// compact car 1.2 m above the ground 0.35 and 1.3 m.
-        const INSETS: [f64; 2] = [0.08, 0.3];
-        /// To either end where it is not.
-        const INSET: f64 = 0.1;
-        /// What is no longer is somebody, or has a rider, who is in the middle within this.
-        const LONGEST_WITH_RIDER_M: f64 = 2.5;
-        const RIDER_M: f64 = 0.15;
-        /// What is longer is a lorry or a bus, as long above as below.
-        const LONGEST_WITH_BONNET_M: f64 = 6.5;
         let expected = [
             expected_m.x * self.cosine + expected_m.y * self.sine,
             expected_m.y * self.cosine - expected_m.x * self.sine,
         ];
-        let mut centre = [0.0; 2];
-        let mut deviation = [0.0; 2];
-        for axis in 0..2 {
-            let (low, high) = (self.low_m[axis], self.high_m[axis]);
-            let half_m = 0.5 * size_m[axis].max(high - low);
-            let unsure_m = 0.5 * size_deviation_m[axis];
-            let is_inset = self.is_upper && axis == 0 && size_m[axis] < LONGEST_WITH_BONNET_M;
-            // Of a bicycle of which the rider is seen nobody knows which end is nearer.
-            let is_rider = is_inset && size_m[axis] < LONGEST_WITH_RIDER_M;
-            let slack_m = (half_m - 0.5 * (high - low)).max(0.0);
-            let shares = match (is_inset, self.is_cabin && drives && !is_rider) {
-                (false, _) => [0.0; 2],
-                (true, false) => [INSET; 2],
-                (true, true) => INSETS,
-            };
-            let reach_m = (shares[0] + shares[1]) * size_m[axis];
-            let part = (2.0 * slack_m).min(reach_m) / reach_m.max(1e-9);
-            let [rear_m, front_m] = shares.map(|share| part * share * size_m[axis]);
-            let edge_m = self.edge_m + rear_m;
-            // Of a side few layers may miss either end: what is seen ends there, and the car goes on.
-            let is_car_side = axis == 0
-                && self.is_side_on[0]
-                && drives
-                && !is_rider
-                && size_m[0] < LONGEST_WITH_BONNET_M;
-            let beyond_m: [f64; 2] = std::array::from_fn(|end| {
-                let most_m = (INSETS[end] * size_m[0]).min(2.0 * slack_m);
-                let told_m = [rear_m, front_m][end];
-                f64::from(is_car_side) * (most_m - told_m).max(0.0)
-            });
-            // What drives out of sight is not seen up to its ends, whatever hides it.
-            let is_piece =
-                axis == 0 && drives && self.is_side_on[0] && high - low < PIECE * size_m[axis];
-            let is_edge = [self.low_is_edge[axis], self.high_is_edge[axis]];
-            let is_edge = is_edge.map(|is_edge| (is_edge || is_rider) && !is_piece);
-            (centre[axis], deviation[axis]) = match is_edge.into() {
-                (true, true) if is_rider && self.is_free => (0.5 * (low + high), edge_m + RIDER_M),
-                (true, true) if is_inset => (
-                    0.5 * (low - rear_m + high + front_m),
-                    edge_m + UPPER * slack_m,
-                ),
-                // Seen from end to end; if it is shorter than known, some of it was missed.
-                (true, true) => {
-                    let missed_m = half_m - 0.5 * (high - low);
-                    (
-                        expected[axis].clamp(
-                            0.5 * (low + high) - 0.5 * missed_m,
-                            0.5 * (low + high) + 0.5 * missed_m,
-                        ),
-                        edge_m + 0.5 * missed_m,
-                    )
-                }
-                (true, false) => {
-                    let (at_m, more_m) = (low - rear_m + half_m, beyond_m[0]);
-                    (
-                        expected[axis].clamp(at_m - more_m, at_m),
-                        libm::hypot(edge_m + 0.5 * more_m, unsure_m),
-                    )
-                }
-                (false, true) => {
-                    let (at_m, more_m) = (high + front_m - half_m, beyond_m[1]);
-                    (
-                        expected[axis].clamp(at_m, at_m + more_m),
-                        libm::hypot(edge_m + 0.5 * more_m, unsure_m),
-                    )
-                }
-                (false, false) => {
-                    let middle = 0.5 * (low + high);
-                    (
-                        expected[axis].clamp(middle - slack_m, middle + slack_m),
-                        edge_m + slack_m,
-                    )
-                }
-            };
-        }
+        let along =
+            [0, 1].map(|axis| self.middle(axis, size_m, size_deviation_m, expected[axis], drives));
+        let centre = along.map(|(middle, _)| middle);
+        let deviation = along.map(|(_, deviation)| deviation);
         // What a direction is off turns the hidden middle about what is seen.
         let seen = [0, 1].map(|axis| 0.5 * (self.low_m[axis] + self.high_m[axis]));
         let askew = [1, 0].map(|other: usize| {
@@ -243,6 +160,96 @@ impl View {
             local(centre[0], centre[1]),
             turn * spread * turn.transpose(),
         )
+    }
+
+    /// Along one axis: where the middle of the box is, and its standard deviation.
+    fn middle(
+        &self,
+        axis: usize,
+        size_m: [f64; 2],
+        size_deviation_m: [f64; 2],
+        expected_m: f64,
+        drives: bool,
+    ) -> (f64, f64) {
+        /// Share of what is missing below a cabin by which its middle is off the vehicle's.
+        const UPPER: f64 = 0.4;
+        /// Share of the length that reaches out below a cabin where the front is known, behind it and before it: in a
+        /// compact car 1.2 m above the ground 0.35 and 1.3 m.
+        const INSETS: [f64; 2] = [0.08, 0.3];
+        /// To either end where it is not.
+        const INSET: f64 = 0.1;
+        /// What is no longer is somebody, or has a rider, who is in the middle within this.
+        const LONGEST_WITH_RIDER_M: f64 = 2.5;
+        const RIDER_M: f64 = 0.15;
+        /// What is longer is a lorry or a bus, as long above as below.
+        const LONGEST_WITH_BONNET_M: f64 = 6.5;
+        let (low, high) = (self.low_m[axis], self.high_m[axis]);
+        let half_m = 0.5 * size_m[axis].max(high - low);
+        let unsure_m = 0.5 * size_deviation_m[axis];
+        let is_inset = self.is_upper && axis == 0 && size_m[axis] < LONGEST_WITH_BONNET_M;
+        // Of a bicycle of which the rider is seen nobody knows which end is nearer.
+        let is_rider = is_inset && size_m[axis] < LONGEST_WITH_RIDER_M;
+        let slack_m = (half_m - 0.5 * (high - low)).max(0.0);
+        let shares = match (is_inset, self.is_cabin && drives && !is_rider) {
+            (false, _) => [0.0; 2],
+            (true, false) => [INSET; 2],
+            (true, true) => INSETS,
+        };
+        let reach_m = (shares[0] + shares[1]) * size_m[axis];
+        let part = (2.0 * slack_m).min(reach_m) / reach_m.max(1e-9);
+        let [rear_m, front_m] = shares.map(|share| part * share * size_m[axis]);
+        let edge_m = self.edge_m + rear_m;
+        // Of a side few layers may miss either end: what is seen ends there, and the car goes on.
+        let is_side = axis == 0 && drives && self.is_side_on[0];
+        let is_car_side = is_side && !is_rider && size_m[0] < LONGEST_WITH_BONNET_M;
+        let beyond_m: [f64; 2] = std::array::from_fn(|end| {
+            let most_m = (INSETS[end] * size_m[0]).min(2.0 * slack_m);
+            let told_m = [rear_m, front_m][end];
+            f64::from(is_car_side) * (most_m - told_m).max(0.0)
+        });
+        // What drives out of sight is not seen up to its ends, whatever hides it.
+        let is_piece = is_side && high - low < PIECE * size_m[axis];
+        let is_edge = [self.low_is_edge[axis], self.high_is_edge[axis]];
+        let is_edge = is_edge.map(|is_edge| (is_edge || is_rider) && !is_piece);
+        match is_edge.into() {
+            (true, true) if is_rider && self.is_free => (0.5 * (low + high), edge_m + RIDER_M),
+            (true, true) if is_inset => (
+                0.5 * (low - rear_m + high + front_m),
+                edge_m + UPPER * slack_m,
+            ),
+            // Seen from end to end; if it is shorter than known, some of it was missed.
+            (true, true) => {
+                let missed_m = half_m - 0.5 * (high - low);
+                (
+                    expected_m.clamp(
+                        0.5 * (low + high) - 0.5 * missed_m,
+                        0.5 * (low + high) + 0.5 * missed_m,
+                    ),
+                    edge_m + 0.5 * missed_m,
+                )
+            }
+            (true, false) => {
+                let (at_m, more_m) = (low - rear_m + half_m, beyond_m[0]);
+                (
+                    expected_m.clamp(at_m - more_m, at_m),
+                    libm::hypot(edge_m + 0.5 * more_m, unsure_m),
+                )
+            }
+            (false, true) => {
+                let (at_m, more_m) = (high + front_m - half_m, beyond_m[1]);
+                (
+                    expected_m.clamp(at_m, at_m + more_m),
+                    libm::hypot(edge_m + 0.5 * more_m, unsure_m),
+                )
+            }
+            (false, false) => {
+                let middle = 0.5 * (low + high);
+                (
+                    expected_m.clamp(middle - slack_m, middle + slack_m),
+                    edge_m + slack_m,
+                )
+            }
+        }
     }
 }
 
