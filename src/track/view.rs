@@ -199,7 +199,8 @@ impl View {
         let part = (2.0 * slack_m).min(reach_m) / reach_m.max(1e-9);
         let [rear_m, front_m] = shares.map(|share| part * share * size_m[axis]);
         let edge_m = self.edge_m + rear_m;
-        // Of a side few layers may miss either end: what is seen ends there, and the car goes on.
+        // Few layers may miss either end of a side: what is seen ends there, and the car goes on (without: kitti of the
+        // shared recordings MOTA 0.709 instead of 0.721).
         let is_side = axis == 0 && drives && self.is_side_on[0];
         let is_car_side = is_side && !is_rider && size_m[0] < LONGEST_WITH_BONNET_M;
         let beyond_m: [f64; 2] = std::array::from_fn(|end| {

@@ -4,7 +4,7 @@ use super::super::gap::{Asked, CAUTION_S, LACKS_S, User, windows};
 use super::super::on_lane::{NEW_S, NEW_SLOW_S};
 use super::*;
 
-/// What is asked of the own arm of a site.
+/// What is asked of the way in of a site's first arm.
 fn asked(site: &Site, is_seen: bool, is_announced: bool) -> Asked<'_> {
     let entry = &site.arms[0].entries[0];
     Asked {
@@ -20,7 +20,7 @@ fn asked(site: &Site, is_seen: bool, is_announced: bool) -> Asked<'_> {
     }
 }
 
-/// When somebody may come to the own arm who has been seen for so long.
+/// When somebody may come to that way who has been seen for so long.
 fn begin_s(user: &Object, known_s: f64, is_announced: bool) -> f64 {
     let mut watcher = watcher();
     watcher.watch(&situation(std::slice::from_ref(user)));
