@@ -21,6 +21,8 @@ pub(super) struct Belief {
     came_in_by: Option<usize>,
     /// Where he most likely was when he was measured last, moved on since.
     last: Vec<OnLane>,
+    /// For how long he has not been listed.
+    away_s: f64,
 }
 
 /// What is remembered of all of them, in places that are used again.
@@ -31,16 +33,28 @@ pub(super) struct Beliefs {
 }
 
 impl Beliefs {
-    /// Forgets all but those whose id counts.
-    pub(super) fn keep(&mut self, counts: impl Fn(u32) -> bool) {
+    /// Forgets everybody.
+    pub(super) fn forget(&mut self) {
+        self.places.clear();
+    }
+
+    /// Forgets where those are who are not listed `passed_s` later, and all of who has been away for too long to come back.
+    pub(super) fn keep(&mut self, is_listed: impl Fn(u32) -> bool, passed_s: f64) {
         for (id, belief) in &mut self.places {
-            if id.is_some_and(|id| !counts(id)) {
+            let Some(known) = *id else { continue };
+            if is_listed(known) {
+                belief.away_s = 0.0;
+                continue;
+            }
+            belief.away_s += passed_s;
+            belief.lanes.clear();
+            belief.last.clear();
+            if belief.away_s > RETURNS_S {
                 *id = None;
-                belief.lanes.clear();
                 belief.mean_speed_mps = None;
                 belief.known_s = 0.0;
                 belief.came_in_by = None;
-                belief.last.clear();
+                belief.away_s = 0.0;
             }
         }
     }
@@ -73,6 +87,9 @@ const YAW_RATE_RADPS: f64 = 0.2;
 const MOVING_MPS: f64 = 0.7;
 /// Share of road users who move as none of the lanes lead: they change lanes, or turn round.
 const OTHERWISE: f64 = 0.05;
+/// Who is listed again with his id after no longer than this came in and drove as before: as long as one may be lost
+/// and get it back.
+const RETURNS_S: f64 = 4.0;
 /// Weight of a revolution in the mean speed: the last second of ten a second.
 const MEAN_SHARE: f64 = 0.1;
 /// Cosine of the direction against a lane within which somebody goes along it.

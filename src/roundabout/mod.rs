@@ -174,7 +174,7 @@ impl Watcher {
     fn forget_users(&mut self) {
         self.advice.own_arm = None;
         self.announced.clear();
-        self.beliefs.keep(|_| false);
+        self.beliefs.forget();
         self.unseen = Unseen::default();
         self.last = None;
         self.since = None;
@@ -220,9 +220,9 @@ impl Watcher {
         let objects = situation.objects;
         let count = self.lanes.len().max(objects.len());
         self.lanes.resize_with(count, Vec::new);
-        // Ids are the tracker's: nothing is remembered of who is not listed.
-        self.beliefs
-            .keep(|id| objects.iter().any(|object| object.id == id));
+        // Ids are the tracker's.
+        let is_listed = |id| objects.iter().any(|object| object.id == id);
+        self.beliefs.keep(is_listed, passed_s);
         // Who is known is known without delay.
         let told_late_s = situation.sight.map_or(0.0, |_| TOLD_LATE_S);
         for (object, lanes) in objects.iter().zip(&mut self.lanes) {

@@ -45,3 +45,27 @@ fn who_is_hidden_goes_round_as_one_drives_there() {
         [2.0, -2.0]
     );
 }
+
+/// What is told of him first may be off.
+#[test]
+fn who_is_listed_again_with_his_id_is_no_newcomer_unless_he_was_away_for_long() {
+    let fast = round(Class::Car, ROAD_M, 180.0, 6.0);
+    let slow = Object {
+        speed_mps: 3.0,
+        ..fast.clone()
+    };
+    let again = |away_tenths: i64| {
+        let mut watcher = known(std::slice::from_ref(&fast));
+        for tenth in 0..=away_tenths {
+            let listed = usize::from(tenth == away_tenths);
+            watcher.watch(&Situation {
+                time: Time::from_micros(NOW.micros() + 100_000 * tenth),
+                ..situation(&std::slice::from_ref(&slow)[..listed])
+            });
+        }
+        watcher.advice().unwrap().users[0].on
+    };
+    let (soon, late) = (again(20), again(60));
+    assert!(soon.mean_speed_mps > 5.0 && soon.known_s > 1.5, "{soon:?}");
+    assert!(late.mean_speed_mps < 3.5 && late.known_s < 0.2, "{late:?}");
+}
