@@ -30,7 +30,7 @@ fn watcher_at(name: &str) -> Watcher {
 }
 
 /// Somebody who goes round on a radius, at an angle from east.
-fn round(class: Class, radius_m: f64, angle_deg: f64, speed_mps: f64) -> Object {
+pub(super) fn round(class: Class, radius_m: f64, angle_deg: f64, speed_mps: f64) -> Object {
     let (sine, cosine) = angle_deg.to_radians().sin_cos();
     let long = if class == Class::Car { 4.4 } else { 1.8 };
     Object {

@@ -269,15 +269,9 @@ impl Stretch {
         for (place, may_hold) in self.may_hold.iter_mut().enumerate() {
             let at_m = place_m(place);
             let is_listed = is_listed(look.objects, at_m);
-            // Where nobody was and nobody is listed, nobody is, be it seen or not.
-            if is_listed || *may_hold > 0 {
-                *may_hold = match (look.sight.reaches(at_m), is_listed) {
-                    (true, true) => 0,
-                    (true, false) => may_hold.saturating_sub(1),
-                    // Should he not be listed any more, he is still there.
-                    (false, true) => (*may_hold).max(1),
-                    (false, false) => *may_hold,
-                };
+            // Where nobody was nobody is, be it seen or not.
+            if *may_hold > 0 && look.sight.reaches(at_m) {
+                *may_hold = if is_listed { 0 } else { *may_hold - 1 };
             }
             if !is_listed && look.is_missed(at_m) {
                 *may_hold = LOOKS;
@@ -322,110 +316,4 @@ fn place_at(site: &Site, angle_rad: f64, count: usize) -> usize {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::parameter::Profile;
-    use crate::roundabout::{RoundaboutParameters, Situation, Watcher};
-    use crate::simulate::scenario;
-    use crate::time::Time;
-
-    fn site() -> Site {
-        let roads = scenario::find("roundabout-traffic").unwrap().roads();
-        let mut watcher = Watcher::new(&RoundaboutParameters::profile(Profile::Default));
-        watcher.take_map(&roads.unwrap());
-        watcher.place(&Situation {
-            time: Time::from_micros(1),
-            reference: None,
-            epoch: 0,
-            vehicle: None,
-            vehicle_speed_mps: 0.0,
-            objects: &[],
-            sight: None,
-        });
-        watcher.sites.remove(0)
-    }
-
-    /// All is seen to be free.
-    fn free(site: &Site) -> Unseen {
-        let stretch = |count| Stretch {
-            may_hold: vec![0; count],
-            gone_m: 0.0,
-        };
-        Unseen {
-            rings: site.rings.iter().map(|_| stretch(40)).collect(),
-            ways: entries(site).map(|_| stretch(25)).collect(),
-            ..Unseen::default()
-        }
-    }
-
-    #[test]
-    fn who_may_come_along_another_way_in_may_come_from_there() {
-        let site = site();
-        let conflict = *site.arms[0].entries[0].conflicts.last().unwrap();
-        let mut unseen = free(&site);
-        let before = |unseen: &Unseen| unseen.before(&site, 0, &conflict, 8.0);
-        assert_eq!(before(&unseen), (f64::INFINITY, 1.0));
-        // The own way in leads nobody across the own way.
-        unseen.ways[0].may_hold[3] = 1;
-        assert_eq!(before(&unseen).0, f64::INFINITY);
-        let soonest_s = (1..4).map(|other| {
-            let mut unseen = free(&site);
-            unseen.ways[other].may_hold[10] = 1;
-            before(&unseen).0
-        });
-        let mut soonest_s: Vec<f64> = soonest_s.collect();
-        soonest_s.sort_by(f64::total_cmp);
-        // Ten places back, of which twelve metres are a bend, and a quarter of the circle from arm to arm, of a radius of 11 m.
-        let round_mps = VARIES * round_mps(11.0);
-        for (quarters, said_s) in (1..4).zip(soonest_s) {
-            let bent_m = 12.0 + 11.0 * TAU / 4.0 * f64::from(quarters);
-            let due_s = (10.0 * APART_M - 12.0) / 8.0 + bent_m / round_mps;
-            assert!((said_s - due_s).abs() < 0.2, "{said_s} {due_s}");
-        }
-    }
-
-    #[test]
-    fn what_is_on_a_way_in_and_not_listed_may_be_somebody() {
-        let site = site();
-        let (_, entry) = entries(&site).nth(1).unwrap();
-        let mut stretch = free(&site).ways.swap_remove(1);
-        let (at_m, heading_rad) = entry.way.at(entry.way.length_m() - 9.0);
-        let (sine, cosine) = libm::sincos(heading_rad);
-        // On the kerb.
-        let aside_m = [at_m[0] - 2.0 * sine, at_m[1] + 2.0 * cosine];
-        stretch.note_thing(entry, aside_m, &[]);
-        assert!(stretch.may_hold.iter().all(|&looks| looks == 0));
-        stretch.note_thing(entry, at_m, &[]);
-        assert_eq!(
-            stretch.may_hold.iter().position(|&looks| looks > 0),
-            Some(4)
-        );
-    }
-
-    #[test]
-    fn who_was_hidden_moves_on_as_fast_as_anybody_may() {
-        let mut stretch = Stretch {
-            may_hold: vec![0, 0, 0, 0, 1],
-            gone_m: 0.0,
-        };
-        assert_eq!(stretch.steps(0.1, 8.0), 0);
-        assert_eq!(stretch.steps(0.4, 8.0), 2);
-        stretch.come_in();
-        assert_eq!(stretch.may_hold, [0, 0, 0, 1, 1]);
-        stretch.go_round(false);
-        assert_eq!(stretch.may_hold, [1, 0, 0, 1, 1]);
-        stretch.may_hold = vec![0, 0, 5, 0, 0];
-        stretch.go_round(true);
-        assert_eq!(stretch.may_hold, [0, 5, 5, 5, 0]);
-    }
-
-    #[test]
-    fn who_goes_from_the_list_is_missed_where_he_was() {
-        let mut unseen = Unseen {
-            listed: vec![(7, [1.0, 2.0], 3.0)],
-            ..Unseen::default()
-        };
-        unseen.note_missing(&[]);
-        assert_eq!(unseen.missing, [([1.0, 2.0], 3.0)]);
-    }
-}
+mod tests;
