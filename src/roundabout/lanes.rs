@@ -33,11 +33,6 @@ pub(super) struct Beliefs {
 }
 
 impl Beliefs {
-    /// Forgets everybody.
-    pub(super) fn forget(&mut self) {
-        self.places.clear();
-    }
-
     /// Forgets where those are who are not listed `passed_s` later, and all of who has been away for too long to come back.
     pub(super) fn keep(&mut self, is_listed: impl Fn(u32) -> bool, passed_s: f64) {
         for (id, belief) in &mut self.places {

@@ -174,7 +174,7 @@ impl Watcher {
     fn forget_users(&mut self) {
         self.advice.own_arm = None;
         self.announced.clear();
-        self.beliefs.forget();
+        self.beliefs = Beliefs::default();
         self.unseen = Unseen::default();
         self.last = None;
         self.since = None;

@@ -26,10 +26,11 @@ const APART_M: f64 = 2.0;
 const BACK_M: f64 = 50.0;
 
 /// Somebody was somewhere until as many looks as this say that nobody is: far away not every revolution meets him. With
-/// five looks drivers who were late waited 159 instead of 125 s (`kreisel drive`, 16 entries), and 72 instead of 81 gaps of 11,000
-/// at any arm were announced that are not there (`scripts/evaluate-roundabouts --seeds 1-70` and others), but as many at the own
-/// arm and at exits, 1 and 5; with one look 26 instead of 21 of 1,650 at any arm, and 5 instead of 1 of 1,330 at exits (`--seeds
-/// 1-30 --scenarios roundabout-traffic,two-lane-roundabout`).
+/// five, 72 instead of 81 gaps of 11,000 at any arm are announced that are not there, but as many at the own arm and at exits, 1
+/// and 5 (`scripts/evaluate-roundabouts --seeds 1-70`, 301-343, 401-425 and 501-540 together), and those who come late wait 159
+/// instead of 125 s (`kreisel drive`: `roundabout-entry` with seeds 301, 307, 422, 519, 601, 613, 627, `two-lane-entry` with 408,
+/// 507, 528, 607, 614, 630, 633, 636, `mini-entry` with 627). With one, 26 instead of 21 gaps of 1,650 at any arm, and 5 instead of
+/// 1 of 1,330 at exits (`--seeds 1-30 --scenarios roundabout-traffic,two-lane-roundabout`).
 const LOOKS: u8 = 3;
 
 /// Where on the rings and the ways in somebody may be who is not listed: what is hidden now and was not seen to be
