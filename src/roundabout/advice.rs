@@ -159,7 +159,8 @@ impl Crossing {
             stop_m: asked.stop_m - motion.front_m,
             seen_share: 1.0,
         };
-        let least_margin_s = parameters.margin_s + asked.caution_s();
+        let [before_s, behind_s] = asked.cautions_s();
+        let least_margin_s = parameters.margin_s + before_s;
         for (number, conflict) in asked.conflicts.iter().enumerate() {
             let [begin_s, end_s] = motion.window_s(conflict, parameters);
             if end_s <= 0.0 {
@@ -173,7 +174,7 @@ impl Crossing {
             let at_point = comers.iter().filter(|window| window.conflict == number);
             for window in at_point {
                 // Gone before the vehicle comes.
-                if window.end_s + gap::BEHIND_S + asked.caution_s() <= begin_s {
+                if window.end_s + gap::BEHIND_S + behind_s <= begin_s {
                     continue;
                 }
                 let margin_s = window.begin_s - end_s;

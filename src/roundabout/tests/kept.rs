@@ -1,6 +1,6 @@
 //! Gaps that have been announced.
 
-use super::super::gap::{Asked, CAUTION_S, LACKS_S, User, windows};
+use super::super::gap::{Asked, LACKS_S, User, windows};
 use super::super::on_lane::{NEW_S, NEW_SLOW_S};
 use super::*;
 
@@ -20,8 +20,8 @@ fn asked(site: &Site, is_seen: bool, is_announced: bool) -> Asked<'_> {
     }
 }
 
-/// When somebody may come to that way who has been seen for so long.
-fn begin_s(user: &Object, known_s: f64, is_announced: bool) -> f64 {
+/// From when to when somebody may be on that way who has been seen for so long.
+fn window_s(user: &Object, known_s: f64, is_announced: bool) -> [f64; 2] {
     let mut watcher = watcher();
     watcher.watch(&situation(std::slice::from_ref(user)));
     let mut on = watcher.lanes[0][0];
@@ -36,7 +36,11 @@ fn begin_s(user: &Object, known_s: f64, is_announced: bool) -> f64 {
         &user,
         &mut found,
     );
-    found[0].begin_s
+    [found[0].begin_s, found[0].end_s]
+}
+
+fn begin_s(user: &Object, known_s: f64, is_announced: bool) -> f64 {
+    window_s(user, known_s, is_announced)[0]
 }
 
 #[test]
@@ -45,9 +49,10 @@ fn a_gap_opens_with_caution_where_road_users_are_seen_and_stays_below_the_margin
     watcher.watch(&situation(&[]));
     assert!(own_arm(&watcher).entry.may_go);
     let site = &watcher.sites[0];
-    assert_eq!(asked(site, false, false).caution_s(), 0.0);
-    assert_eq!(asked(site, true, false).caution_s(), CAUTION_S);
-    assert_eq!(asked(site, true, true).caution_s(), -LACKS_S);
+    assert_eq!(asked(site, false, false).cautions_s(), [0.0; 2]);
+    let [before_s, behind_s] = asked(site, true, false).cautions_s();
+    assert!(before_s > behind_s && behind_s > 0.0);
+    assert_eq!(asked(site, true, true).cautions_s(), [-LACKS_S; 2]);
     assert!(watcher.is_announced(1, false));
     watcher.forget();
     assert!(!watcher.is_announced(1, false));
@@ -79,4 +84,31 @@ fn who_is_beside_the_road_is_known_sooner() {
     assert!(is_new(Class::Car, ROAD_M, known_s));
     assert!(!is_new(Class::Cyclist, BIKEWAY_M, known_s));
     assert!(is_new(Class::Cyclist, BIKEWAY_M, 0.5 * NEW_SLOW_S));
+}
+
+#[test]
+fn beside_the_road_nobody_comes_earlier_because_his_speed_is_less_known() {
+    let earlier_s = |class, radius_m| {
+        let begin_s = |deviation_mps| {
+            let mut user = round(class, radius_m, 150.0, 4.0);
+            user.speed_deviation_mps = deviation_mps;
+            begin_s(&user, 5.0, false)
+        };
+        begin_s(0.1) - begin_s(0.9)
+    };
+    assert!(earlier_s(Class::Car, ROAD_M) > 0.1);
+    assert_eq!(earlier_s(Class::Cyclist, BIKEWAY_M), 0.0);
+}
+
+#[test]
+fn a_cyclist_of_whom_little_is_seen_is_gone_as_late_as_a_bicycle_is_long() {
+    let mut user = round(Class::Cyclist, BIKEWAY_M, 210.0, 4.0);
+    let [begins, ends] = [0, 1].map(|end| {
+        [0.4, 1.6].map(|length_m| {
+            user.length_m = length_m;
+            window_s(&user, 5.0, false)[end]
+        })
+    });
+    assert_eq!(ends[0], ends[1]);
+    assert!(begins[0] > begins[1] + 0.1, "{begins:?}");
 }
