@@ -121,6 +121,27 @@ fn a_drive_that_begins_between_hedges_and_walls_is_not_taken_for_standing() {
 }
 
 #[test]
+fn where_little_is_seen_a_drive_begins_as_fast_as_its_poses_say() {
+    for seed in [643, 651, 687, 709] {
+        let turns = drive("two-lane-entry", seed, 12);
+        let mut pipeline = pipeline();
+        let reports: Vec<RevolutionReport> = turns
+            .iter()
+            .map(|turn| feed(&mut pipeline, turn, true))
+            .collect();
+        let [way_m, said_m] = [
+            turns.iter().map(|turn| turn.truth.sensor_m[1]).collect(),
+            reports
+                .iter()
+                .map(|report| place_m(report).0[1])
+                .collect::<Vec<f64>>(),
+        ]
+        .map(|along_m: Vec<f64>| along_m[11] - along_m[6]);
+        assert!((way_m - said_m).abs() < 0.5, "{seed}: {way_m} {said_m}");
+    }
+}
+
+#[test]
 fn what_is_settled_after_the_answer_or_before_the_next_one_is_the_same() {
     let (mut early, mut late) = (pipeline(), pipeline());
     for turn in drive("strangers", 605, 25) {

@@ -214,7 +214,8 @@ impl Odometry {
         let predicted = self.motion;
         let mut attempt = self.attempt(predicted);
         let mut doubtful = None;
-        if self.state == State::Begun {
+        // Where little is upright another motion may seem to fit better than the one that poses tell.
+        if self.state == State::Begun && !self.is_led {
             attempt = self.search(predicted, attempt, Reach::Anywhere);
         } else if !self.is_usual(&attempt) {
             attempt = self.search(predicted, attempt, Reach::Jerk);
