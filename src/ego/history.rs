@@ -109,6 +109,12 @@ impl<T: Blend> History<T> {
         self.at(self.lag.by_its_clock(time), limit)
     }
 
+    /// Whether values were known by a time of the revolutions' clock already.
+    pub(super) fn reaches(&self, time: Time) -> bool {
+        let first = self.values.first();
+        first.is_some_and(|(first, _)| *first <= self.lag.by_its_clock(time))
+    }
+
     pub(super) fn last(&self) -> Option<(Time, T)> {
         self.values.last().copied()
     }

@@ -34,6 +34,8 @@ pub use pose::{Placement, Pose, wrapped_rad};
 pub use refusal::PoseRefusal;
 pub use sweep::{Frame, Sweep};
 
+use nalgebra::Vector6;
+
 use crate::cloud::Scan;
 use crate::geometry::{Outline, Rectangle};
 use crate::odometry::{Odometry, OdometryReport, Quality};
@@ -149,6 +151,9 @@ pub struct EgoReport {
     pub distrusted: Option<&'static str>,
 }
 
+/// How wrong a velocity may be that poses tell: two that are 0.1 m off, half a sweep apart.
+const BEGIN_WITHIN_MPS: f64 = 3.0;
+
 /// Age of the odometry frame up to which it begins anew, along the axes of the local frame, when a first pose comes.
 const YOUNG: Span = Span::from_micros(3_000_000);
 
@@ -260,11 +265,7 @@ impl Ego {
                 self.epoch = self.epoch.wrapping_add(1);
             }
             self.keep_jumps();
-            let before = self.sources.pose_from(*source, middle + swept);
-            let velocity = before.map(|before| {
-                let before = self.parameters.sensor(&before).rigid();
-                before.step_to(&sensor.rigid()) / scan.duration_s()
-            });
+            let velocity = self.begin_velocity(*source, sensor, middle, scan.duration_s());
             self.odometry.begin(&sensor.rigid(), velocity);
             let mut anchoring = Anchoring::begin(source.frame(), &self.parameters);
             if velocity.is_none() {
@@ -300,6 +301,29 @@ impl Ego {
                 .take(middle, &pose, source.frame(), sensor, &self.parameters);
         }
         self.sweep(scan)
+    }
+
+    /// How fast the sensor goes when the frame begins, and to within what: by the way over a whole sweep, or over half of one
+    /// where poses have only begun. By a single pose it stands, or goes anyhow.
+    fn begin_velocity(
+        &self,
+        source: Source,
+        sensor: &Pose,
+        middle: Time,
+        swept_s: f64,
+    ) -> Option<(Vector6<f64>, f64)> {
+        let velocity = |share: f64| {
+            let passed_s = share * swept_s;
+            let time = middle + Span::from_seconds(-passed_s);
+            let before = self.sources.pose_from(source, time)?;
+            let before = self.parameters.sensor(&before).rigid();
+            let velocity = before.step_to(&sensor.rigid()) / passed_s;
+            Some((velocity, self.sources.reaches(source, time)))
+        };
+        let known = [1.0, 0.5].into_iter().filter_map(velocity);
+        let known = known.filter(|(_, is_known)| *is_known).map(|(by, _)| by);
+        let known = known.map(|velocity| (velocity, BEGIN_WITHIN_MPS)).next();
+        known.or_else(|| velocity(1.0).map(|(velocity, _)| (velocity, f64::INFINITY)))
     }
 
     /// Does what the answer to the last revolution need not wait for ([`Odometry::settle`]).

@@ -344,6 +344,14 @@ impl Sources {
         })
     }
 
+    /// Whether a source was heard by a time already.
+    pub(super) fn reaches(&self, source: Source, time: Time) -> bool {
+        match source {
+            Source::Separate => self.places.reaches(time) && self.headings.reaches(time),
+            _ => self.history(source).reaches(time),
+        }
+    }
+
     /// Ground speed and yaw rate as they are sent.
     pub(super) fn rates(&self, time: Time) -> [Option<f64>; 2] {
         [&self.speeds, &self.yaw_rates].map(|history| history.at_end(time, self.limit()))

@@ -51,8 +51,8 @@ pub struct Odometry {
     /// Motions that are looked for, and how well each fits.
     found: Vec<(f64, Vector6<f64>)>,
     state: State,
-    /// Whether the frame began at a velocity that was known.
-    is_led: bool,
+    /// How far off the velocity may be at which the frame began, m/s, if one was told.
+    led_within_mps: Option<f64>,
     /// Revolutions since then that were followed, while it is young.
     followed: u32,
     /// In so many of them, up to the last one, another motion fitted better.
@@ -123,7 +123,7 @@ impl Default for Odometry {
             links: Links::default(),
             found: Vec::with_capacity(128),
             state: State::New,
-            is_led: false,
+            led_within_mps: None,
             followed: 0,
             doubted: 0,
             epoch: 0,
@@ -138,10 +138,10 @@ impl Default for Odometry {
 
 impl Odometry {
     /// Begins a new frame, in which the sensor is at `pose` in the middle of the next sweep, and at a velocity (metres and
-    /// radians a second, in that frame) if that is known.
-    pub fn begin(&mut self, pose: &Rigid, velocity: Option<Vector6<f64>>) {
-        self.motion = Motion::begin(*pose, velocity);
-        self.is_led = velocity.is_some();
+    /// radians a second, in that frame) if that is known, to within so many m/s.
+    pub fn begin(&mut self, pose: &Rigid, velocity: Option<(Vector6<f64>, f64)>) {
+        self.motion = Motion::begin(*pose, velocity.map(|(velocity, _)| velocity));
+        self.led_within_mps = velocity.map(|(_, within_mps)| within_mps);
         (self.followed, self.doubted) = (0, 0);
         self.time = None;
         self.map.clear();
@@ -214,9 +214,16 @@ impl Odometry {
         let predicted = self.motion;
         let mut attempt = self.attempt(predicted);
         let mut doubtful = None;
-        // Where little is upright another motion may seem to fit better than the one that poses tell.
-        if self.state == State::Begun && !self.is_led {
-            attempt = self.search(predicted, attempt, Reach::Anywhere);
+        if self.state == State::Begun {
+            let found = self.search(predicted, attempt, Reach::Anywhere);
+            // Where little is upright another motion may seem to fit better than the one that poses tell.
+            let off = geometry::linear(&(found.motion.velocity - predicted.velocity));
+            let within_mps = self.led_within_mps.unwrap_or(f64::INFINITY);
+            if off.norm_squared() > within_mps * within_mps {
+                self.unskew(&attempt.motion);
+            } else {
+                attempt = found;
+            }
         } else if !self.is_usual(&attempt) {
             attempt = self.search(predicted, attempt, Reach::Jerk);
         } else if self.is_young() {
@@ -312,7 +319,7 @@ impl Odometry {
             usual.share += FRESH * (agreement.share - usual.share);
             usual.sum += FRESH * (agreement.sum - usual.sum);
         }
-        if self.state == State::Begun && !self.is_led {
+        if self.state == State::Begun && self.led_within_mps.is_none() {
             // The first sweep was taken for one from a standing sensor: it ended farther on.
             let early_s = -0.5 * scan.duration_s();
             self.motion.pose = self.motion.pose.moved(&(self.motion.velocity * early_s));
