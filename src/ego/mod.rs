@@ -317,13 +317,17 @@ impl Ego {
             let time = middle + Span::from_seconds(-passed_s);
             let before = self.sources.pose_from(source, time)?;
             let before = self.parameters.sensor(&before).rigid();
-            let velocity = before.step_to(&sensor.rigid()) / passed_s;
-            Some((velocity, self.sources.reaches(source, time)))
+            let within_mps = if self.sources.reaches(source, time) {
+                BEGIN_WITHIN_MPS
+            } else {
+                f64::INFINITY
+            };
+            Some((before.step_to(&sensor.rigid()) / passed_s, within_mps))
         };
-        let known = [1.0, 0.5].into_iter().filter_map(velocity);
-        let known = known.filter(|(_, is_known)| *is_known).map(|(by, _)| by);
-        let known = known.map(|velocity| (velocity, BEGIN_WITHIN_MPS)).next();
-        known.or_else(|| velocity(1.0).map(|(velocity, _)| (velocity, f64::INFINITY)))
+        let is_known = |&(_, within_mps): &(_, f64)| within_mps.is_finite();
+        let whole = velocity(1.0);
+        let known = whole.filter(is_known);
+        known.or_else(|| velocity(0.5).filter(is_known)).or(whole)
     }
 
     /// Does what the answer to the last revolution need not wait for ([`Odometry::settle`]).
