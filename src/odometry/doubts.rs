@@ -32,7 +32,7 @@ impl Odometry {
     pub(super) fn is_young(&self) -> bool {
         /// Revolutions in which it is asked.
         const YOUNG: u32 = 20;
-        self.led_within_mps.is_none() && self.followed < YOUNG
+        !self.is_led() && self.followed < YOUNG
     }
 
     /// Whether a revolution of a young frame fits another motion better, as the one before it did: along a wall little tells them

@@ -150,6 +150,11 @@ impl Odometry {
         self.unsettled = None;
     }
 
+    /// Whether the frame began at a velocity that was told.
+    fn is_led(&self) -> bool {
+        self.led_within_mps.is_some()
+    }
+
     /// Whether the next scan begins a frame.
     pub fn begins(&self) -> bool {
         self.state == State::New
@@ -319,7 +324,7 @@ impl Odometry {
             usual.share += FRESH * (agreement.share - usual.share);
             usual.sum += FRESH * (agreement.sum - usual.sum);
         }
-        if self.state == State::Begun && self.led_within_mps.is_none() {
+        if self.state == State::Begun && !self.is_led() {
             // The first sweep was taken for one from a standing sensor: it ended farther on.
             let early_s = -0.5 * scan.duration_s();
             self.motion.pose = self.motion.pose.moved(&(self.motion.velocity * early_s));
