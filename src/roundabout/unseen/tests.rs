@@ -74,13 +74,31 @@ fn what_is_on_a_way_in_and_not_listed_may_be_somebody() {
     let (sine, cosine) = libm::sincos(heading_rad);
     // On the kerb.
     let aside_m = [at_m[0] - 2.0 * sine, at_m[1] + 2.0 * cosine];
-    stretch.note_thing(entry, aside_m, &[]);
+    stretch.note_thing(entry, aside_m, false, &[]);
     assert!(stretch.may_hold.iter().all(|&looks| looks == 0));
-    stretch.note_thing(entry, at_m, &[]);
+    stretch.note_thing(entry, at_m, false, &[]);
     assert_eq!(
         stretch.may_hold.iter().position(|&looks| looks > 0),
         Some(4)
     );
+}
+
+#[test]
+fn what_crosses_a_way_in_comes_along_it_only_where_somebody_was_behind() {
+    let site = site();
+    let (_, entry) = entries(&site).nth(1).unwrap();
+    let at_m = entry.way.at(entry.way.length_m() - 9.0).0;
+    let soonest = |held: &[usize]| {
+        let mut stretch = free(&site).ways.swap_remove(1);
+        for &place in held {
+            stretch.may_hold[place] = 1;
+        }
+        stretch.note_thing(entry, at_m, true, &[]);
+        stretch.may_hold.iter().position(|&looks| looks == LOOKS)
+    };
+    assert_eq!(soonest(&[]), None);
+    assert_eq!(soonest(&[3, 7]), None);
+    assert_eq!(soonest(&[6]), Some(4));
 }
 
 #[test]
