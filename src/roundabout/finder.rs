@@ -3,8 +3,8 @@
 //! Numbers were set by reasoning, and tried with `scripts/evaluate-roundabouts --seeds 1-6`.
 
 use super::Situation;
+use super::candidates::course;
 use super::kerbs::Kerbs;
-use super::lanes::course;
 use crate::ego::wrapped_rad;
 use crate::roadmap::{
     Access, Arm, DrivenRoundabout, DrivenWay, Edges, LaneKind, driven_roundabouts, simplified,

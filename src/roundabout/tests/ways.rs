@@ -1,6 +1,7 @@
 //! Where somebody comes in and leaves.
 
 use super::*;
+use crate::roundabout::lanes::Belief;
 use crate::roundabout::leaving::still_there;
 
 /// A car on the western arm's way in, so far before its end.
@@ -186,4 +187,29 @@ fn who_is_on_the_inner_lane_may_leave_where_the_mouth_of_the_exit_begins() {
         .map(|window| window.probability)
         .sum();
     assert!((0.01..0.5).contains(&probability), "{probability}");
+}
+
+#[test]
+fn who_gathers_speed_before_the_bend_does_not_brake_for_it() {
+    const TOLD_LATE_S: f64 = 0.5;
+    let mut watcher = watcher();
+    watcher.watch(&situation(&[]));
+    // Speed now and in the mean, after three seconds in which he is told to become faster by so much.
+    let speeds_mps = |faster_mps2: f64| {
+        let (mut belief, mut found) = (Belief::default(), vec![]);
+        for revolution in -30..=0 {
+            let told_mps = 8.0 + faster_mps2 * 0.1 * f64::from(revolution);
+            let object = coming(20.0, told_mps, &watcher);
+            let site = &watcher.sites[0];
+            belief.update(site, &object, [0.1, TOLD_LATE_S], &mut vec![], &mut found);
+        }
+        [found[0].speed_mps, found[0].mean_speed_mps]
+    };
+    // As hard as drivers brake, though it was told late.
+    let [now_mps, mean_mps] = speeds_mps(0.0);
+    assert!((8.0 - now_mps - TOLD_LATE_S * 1.3).abs() < 0.2, "{now_mps}");
+    assert!((now_mps - mean_mps).abs() < 0.2, "{mean_mps}");
+    let [now_mps, mean_mps] = speeds_mps(0.4);
+    assert_eq!(now_mps, 8.0);
+    assert!((7.5..7.9).contains(&mean_mps), "{mean_mps}");
 }
