@@ -32,9 +32,16 @@ pub(super) fn lay_out(rings: &mut Vec<Ring>, edges: Edges) {
         count => (last_m - first_m) / (count - 1) as f64 / 2.0,
     };
     let built_m = [first_m - half_m, last_m + half_m];
+    // The road does not reach over what leads around it.
+    let around_m = others
+        .iter()
+        .map(|ring| ring.circle.radius_m - ring.kind.usual_width_m() / 2.0)
+        .filter(|&inner_m| inner_m > last_m)
+        .fold(f64::INFINITY, f64::min);
+    let outer_m = edges.outer_m.filter(|&outer_m| outer_m < around_m);
     let [inner_m, outer_m] = [
         edges.inner_m.unwrap_or(built_m[0]),
-        edges.outer_m.unwrap_or(built_m[1]),
+        outer_m.unwrap_or(built_m[1]),
     ];
     // What else steps up there is no edge of this road: one of both, or either.
     let roads_m = [
@@ -135,16 +142,22 @@ mod tests {
     use super::*;
     use crate::roadmap::Circle;
 
-    fn laid_out(driven_m: &[f64], inner_m: Option<f64>, outer_m: Option<f64>) -> Vec<[f64; 2]> {
-        let rings = driven_m.iter().map(|&radius_m| Ring {
+    fn ring(radius_m: f64, kind: LaneKind) -> Ring {
+        Ring {
             circle: Circle {
                 centre_m: [0.0; 2],
                 radius_m,
             },
             width_m: 0.0,
-            kind: LaneKind::Road,
+            kind,
             is_marked: false,
-        });
+        }
+    }
+
+    fn laid_out(driven_m: &[f64], inner_m: Option<f64>, outer_m: Option<f64>) -> Vec<[f64; 2]> {
+        let rings = driven_m
+            .iter()
+            .map(|&radius_m| ring(radius_m, LaneKind::Road));
         let mut rings = rings.collect();
         lay_out(&mut rings, Edges { inner_m, outer_m });
         let lanes = rings.iter().map(|ring| [ring.inner_m(), ring.outer_m()]);
@@ -160,6 +173,21 @@ mod tests {
         assert_eq!(laid_out(&[6.8], Some(3.2), Some(9.0)), [[3.2, 9.0]]);
         let two = [[13.0, 17.0], [17.0, 21.0]];
         assert_eq!(laid_out(&[15.0, 19.0], Some(13.0), Some(21.0)), two);
+    }
+
+    #[test]
+    fn a_kerb_beyond_the_bikeway_is_no_edge_of_the_road() {
+        let outer_m = |edge_m: f64| {
+            let mut rings = vec![ring(11.0, LaneKind::Road), ring(16.7, LaneKind::Bikeway)];
+            let edges = Edges {
+                inner_m: Some(7.2),
+                outer_m: Some(edge_m),
+            };
+            lay_out(&mut rings, edges);
+            rings[0].outer_m()
+        };
+        assert!((outer_m(14.8) - 14.8).abs() < 1e-9);
+        assert!((outer_m(16.5) - 15.0).abs() < 0.3, "{}", outer_m(16.5));
     }
 
     #[test]
