@@ -6,7 +6,7 @@ use super::candidates::{Candidate, course, take_candidates};
 use super::leaving::{MOUTH_M, takes};
 use super::on_lane::{NEW_S, OnLane, Place};
 use super::site::Site;
-use crate::track::Object;
+use crate::track::{MOST_LOST_S, Object};
 
 /// What the filter remembers of a road user: lanes with their probabilities.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -45,7 +45,8 @@ impl Beliefs {
             belief.away_s += passed_s;
             belief.lanes.clear();
             belief.last.clear();
-            if belief.away_s > RETURNS_S {
+            // Who gets his id back came in and drove as before.
+            if belief.away_s > MOST_LOST_S {
                 *id = None;
                 belief.mean_told_mps = None;
                 belief.known_s = 0.0;
@@ -73,9 +74,6 @@ pub(super) const LEAST_PROBABILITY: f64 = 0.01;
 /// Share of the belief that is forgotten at each revolution: who was surely on a lane may be on
 /// another one half a second later.
 const FORGOTTEN: f64 = 0.2;
-/// Who is listed again with his id after no longer than this came in and drove as before: as long as one may be lost
-/// and get it back.
-const RETURNS_S: f64 = 4.0;
 /// Weight of a revolution in the mean speed: the last second of ten a second.
 const MEAN_SHARE: f64 = 0.1;
 impl Belief {

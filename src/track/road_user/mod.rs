@@ -32,6 +32,7 @@ use crate::geometry::Rectangle;
 use crate::time::Time;
 pub(super) use gating::GATE;
 use newness::Newness;
+pub(crate) use reunion::MOST_LOST_S;
 use reunion::Parting;
 
 /// Standard deviation of the velocity of something seen for the first time, and of a vehicle: who

@@ -9,7 +9,7 @@ use crate::time::Time;
 use crate::track::motion::Estimate;
 
 /// How long a lost road user may be out of sight and still be the same.
-const LONGEST_S: f64 = 4.0;
+pub(crate) const MOST_LOST_S: f64 = 4.0;
 /// How far from where both velocities lead it may be, and for each metre of its length and of
 /// the way more.
 const OFF_M: f64 = 0.8;
@@ -178,7 +178,7 @@ impl Parting {
 impl Track {
     /// Whether it may come back at a time, and is then worth an old id.
     pub(in crate::track) fn may_return(&self, now: Time) -> bool {
-        self.was_likely && (now - self.last_measured).seconds() <= LONGEST_S
+        self.was_likely && (now - self.last_measured).seconds() <= MOST_LOST_S
     }
 
     /// How far this new track is from where one that is not seen any more would be by now;
@@ -189,7 +189,7 @@ impl Track {
         // A few returns may have been taken for the old one where this one was already seen.
         let is_apart =
             lost.parted.at < self.first_seen || lost.parted.points < CLEAR * self.parted.points;
-        let is_in_time = gap_s > 0.0 && gap_s <= LONGEST_S;
+        let is_in_time = gap_s > 0.0 && gap_s <= MOST_LOST_S;
         if !is_in_time || !is_apart || self.shape.seen_m[0] > length_m + GROWTH_M {
             return None;
         }
