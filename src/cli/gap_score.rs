@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use super::window_score::WindowScore;
 use crate::roadmap::{LaneKind, Roadmap};
 use crate::roundabout::{
     Advice, Crossing, Place, RoundaboutParameters, Situation, Watcher, Window,
@@ -44,6 +45,7 @@ pub(super) struct GapScore {
     revolutions: usize,
     agreed: usize,
     comings: Comings,
+    windows: WindowScore,
     /// Right and all, of cars and of cyclists.
     lanes: [[usize; 2]; 2],
 }
@@ -80,6 +82,7 @@ impl GapScore {
             revolutions: 0,
             agreed: 0,
             comings: Comings::default(),
+            windows: WindowScore::default(),
             lanes: [[0; 2]; 2],
         }
     }
@@ -108,6 +111,7 @@ impl GapScore {
         let pairs = pairs(objects, truth.objects);
         compare_lanes(&mut self.lanes, advice, true_advice, truth.objects, &pairs);
         let ours = pairs.iter().map(|&(object, user)| (user, object)).collect();
+        self.windows.take(advice, true_advice, &ours);
         self.comings
             .take(advice, true_advice, &ours, truth.time.seconds());
     }
@@ -127,7 +131,7 @@ impl GapScore {
         format!(
             "{}all {} arms: {}; {} decisions, of which {} as the rule on true road users; time to the conflict \
              point at 3 s off by {:.2} s median, {:.2} s at 95 % of {}; stay or exit right {}; lane right: cars {}, \
-             cyclists {}\nexits: {}",
+             cyclists {}\nexits: {}\n{}",
             own.unwrap_or_default(),
             self.entries.len(),
             gaps_of(&self.entries),
@@ -140,6 +144,7 @@ impl GapScore {
             share(self.lanes[0]),
             share(self.lanes[1]),
             gaps_of(&self.exits),
+            self.windows.summary(),
         )
     }
 }

@@ -76,6 +76,7 @@ mod simulate;
 mod summary;
 
 mod view;
+mod window_score;
 
 use std::net::Ipv4Addr;
 use std::process::ExitCode;
