@@ -35,6 +35,10 @@ const NEAR_M: f64 = 6.0;
 const SHORT_M: f64 = 1.0;
 /// And by this share of the range: low rays meet the ground before the place.
 const SHORT_SHARE: f64 = 0.05;
+/// No car is lower.
+const LOW_CAR_M: f64 = 1.2;
+/// A ray that ends so far behind a place met nobody there.
+const BEYOND_M: f64 = 1.0;
 
 impl Sight<'_> {
     /// Places of the local frame where something is at the height of road users: a few points of every cluster, and all
@@ -95,7 +99,22 @@ impl Sight<'_> {
     }
 
     /// Whether a ray reached a place of the local frame, a little above the ground.
-    pub(super) fn reaches(&self, [x, y]: [f64; 2]) -> bool {
+    pub(super) fn reaches(&self, at_m: [f64; 2]) -> bool {
+        self.is_met(at_m, |out_m, _, reached_m| {
+            reached_m > out_m * (1.0 - SHORT_SHARE) - SHORT_M
+        })
+    }
+
+    /// Whether one passed over it where even a low car would have stopped it.
+    pub(super) fn passes(&self, at_m: [f64; 2]) -> bool {
+        self.is_met(at_m, |out_m, height_m, reached_m| {
+            height_m < LOW_CAR_M && reached_m > out_m + BEYOND_M
+        })
+    }
+
+    /// Whether two of three rays side by side, next below or above the height of road users, are as is asked, by the place's
+    /// distance, their height there and how far they came.
+    fn is_met(&self, [x, y]: [f64; 2], is_as_asked: impl Fn(f64, f64, f64) -> bool) -> bool {
         let level = Vector3::new(x, y, self.sensor.translation_m.z);
         let from = self.sensor.rotation.transpose() * (level - self.sensor.translation_m);
         let out_m = libm::hypot(from.x, from.y);
@@ -111,17 +130,20 @@ impl Sight<'_> {
         let above = (0..layers).find(|&layer| self.scan.slope(layer).0 > tangent);
         let above = above.unwrap_or(layers);
         let azimuths = self.scan.azimuths();
-        let near_m = out_m * (1.0 - SHORT_SHARE) - SHORT_M;
         let seen = [above.wrapping_sub(1), above]
             .into_iter()
             .filter(|&layer| layer < layers);
-        let reached = |layer: usize, after: isize| {
+        let is_met = |layer: usize, after: isize| {
             let column = azimuths.column_beside(column, after).unwrap_or(column);
             let reached_m = self.scan.reached_m()[column * MAX_LAYERS + layer];
-            reached_m == 0.0 || f64::from(reached_m) > near_m
+            let reached_m = if reached_m == 0.0 {
+                f64::INFINITY
+            } else {
+                f64::from(reached_m)
+            };
+            is_as_asked(out_m, below_m + out_m * self.scan.slope(layer).0, reached_m)
         };
-        // Two of three rays side by side.
-        let mut seen = seen.map(|layer| [-1, 0, 1].map(|after| reached(layer, after)));
-        seen.any(|rays| rays.into_iter().filter(|&reached| reached).count() >= 2)
+        let mut seen = seen.map(|layer| [-1, 0, 1].map(|after| is_met(layer, after)));
+        seen.any(|rays| rays.into_iter().filter(|&met| met).count() >= 2)
     }
 }

@@ -149,8 +149,8 @@ fn who_is_listed_and_hidden_makes_nobody_else_possible_until_he_goes_from_the_li
         ..round(Class::Car, 11.0, 0.0, 5.0)
     };
     assert_eq!(take(&[hidden], &[]), [0; 5]);
-    assert_eq!(take(&[], &[(place_m(2), 3.0)]), [0, 0, LOOKS, 0, 0]);
-    assert_eq!(take(&[], &[]), [0, 0, LOOKS, 0, 0]);
+    assert_eq!(take(&[], &[(place_m(2), 3.0)]), [0, 0, LOST_LOOKS, 0, 0]);
+    assert_eq!(take(&[], &[]), [0, 0, LOST_LOOKS, 0, 0]);
 }
 
 #[test]
@@ -161,4 +161,37 @@ fn who_goes_from_the_list_is_missed_where_he_was() {
     };
     unseen.note_missing(&[]);
     assert_eq!(unseen.missing, [([1.0, 2.0], 3.0)]);
+}
+
+#[test]
+fn who_goes_from_the_list_may_be_there_until_rays_would_have_met_even_a_low_car() {
+    // 35 m ahead the ray 1 degree down passes at 1.3 m; the next one ends there or, behind it, on the ground.
+    let ending_at =
+        |range_cm: u16| scan_of(1800, move |_, layer| if layer == 6 { range_cm } else { 0 });
+    let (met, passed) = (ending_at(3500), ending_at(3620));
+    let mut stretch = Stretch {
+        may_hold: vec![0],
+        gone_m: 0.0,
+    };
+    let mut take = |scan: &crate::cloud::Scan, missing: &[_]| {
+        let look = Look {
+            sight: &Sight {
+                scan,
+                sensor: &Pose::SENSOR.rigid(),
+                ground: &Plane::level(1.9),
+                clusters: &Clusters::default(),
+                heights_m: &[],
+            },
+            objects: &[],
+            missing,
+        };
+        stretch.take(&look, |_| [0.0, 35.0]);
+        stretch.may_hold[0]
+    };
+    assert_eq!(take(&met, &[([0.0, 35.0], 3.0)]), LOST_LOOKS);
+    assert_eq!(take(&met, &[]), LOST_LOOKS - 1);
+    let left = LOST_LOOKS - 1 - MEETING_LOOKS;
+    assert_eq!(take(&passed, &[]), left);
+    assert_eq!(take(&passed, &[]), left - MEETING_LOOKS);
+    assert_eq!(take(&passed, &[]), 0);
 }
