@@ -38,8 +38,8 @@ const BACK_M: f64 = 50.0;
 /// 507, 528, 607, 614, 630, 633, 636, `mini-entry` with 627). With one, 26 instead of 21 gaps of 1,650 at any arm, and 5 instead of
 /// 1 of 1,330 at exits (`--seeds 1-30 --scenarios roundabout-traffic,two-lane-roundabout`).
 const LOOKS: u8 = 3;
-/// The same of who was listed and is not any more, and looks that count as many: of rays that would have met even a low car.
-/// 35 m away one ray meets its sill, which may be a bump of the road, and the next one passes above it. With [`LOOKS`] 59
+/// The same of who was listed and is not any more; a look of rays that would have met even a low car counts as several. 35 m
+/// away one ray meets its sill, which may be a bump of the road, and the next one passes above it. With [`LOOKS`] 59
 /// instead of 55 gaps of 8,400 at any arm are announced that are not there, one of them instead of none at the own arm
 /// (`--seeds 301-343`, 401-425, 501-540 and 601-625); those who come late wait as long.
 const LOST_LOOKS: u8 = 15;
@@ -118,7 +118,7 @@ impl Unseen {
                 let is_on = ring.circle.off_m(at_m).abs() < ON_LANE * ring.width_m / 2.0;
                 if is_on && !is_listed(objects, at_m) {
                     let place = place_at(site, site.angle_rad(at_m), stretch.may_hold.len());
-                    stretch.may_hold[place] = LOOKS;
+                    stretch.may_hold[place] = stretch.may_hold[place].max(LOOKS);
                     crosses |= ring.kind != LaneKind::Road;
                 }
             }
@@ -282,7 +282,7 @@ impl Stretch {
             && station.distance_m < half_m
             && !is_listed(objects, at_m)
         {
-            *may_hold = LOOKS;
+            *may_hold = (*may_hold).max(LOOKS);
         }
     }
 
