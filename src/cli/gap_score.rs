@@ -23,7 +23,7 @@ const CLEARLY_S: f64 = 0.25;
 /// Times to the conflict point are compared from so early.
 const HORIZON_S: std::ops::Range<f64> = 2.5..3.5;
 /// What was said of a time so far off was of another coming, at which he left after all.
-const ANOTHER_S: f64 = 10.0;
+pub(super) const ANOTHER_S: f64 = 10.0;
 /// Stay or exit is judged so long before the conflict point.
 const JUDGED_S: f64 = 1.5;
 /// Farther apart are two different things.
@@ -122,11 +122,6 @@ impl GapScore {
         let own = own.map(|own| format!("own arm: {}\n", gaps_of(own)));
         let mut errors_s = self.comings.errors_s.clone();
         errors_s.sort_by(f64::total_cmp);
-        let quantile = |part: f64| {
-            let index = (part * errors_s.len() as f64) as usize;
-            let index = index.min(errors_s.len().saturating_sub(1));
-            errors_s.get(index).copied().unwrap_or(0.0)
-        };
         let share = |[right, all]: [usize; 2]| format!("{right} of {all}");
         format!(
             "{}all {} arms: {}; {} decisions, of which {} as the rule on true road users; time to the conflict \
@@ -137,8 +132,8 @@ impl GapScore {
             gaps_of(&self.entries),
             self.revolutions,
             self.agreed,
-            quantile(0.5),
-            quantile(0.95),
+            quantile(&errors_s, 0.5),
+            quantile(&errors_s, 0.95),
             errors_s.len(),
             share(self.comings.judged),
             share(self.lanes[0]),
@@ -147,6 +142,13 @@ impl GapScore {
             self.windows.summary(),
         )
     }
+}
+
+/// Of sorted numbers the one below which a part of them lies; 0 of none.
+pub(super) fn quantile(sorted: &[f64], part: f64) -> f64 {
+    let index = (part * sorted.len() as f64) as usize;
+    let index = index.min(sorted.len().saturating_sub(1));
+    sorted.get(index).copied().unwrap_or(0.0)
 }
 
 /// How gaps were announced on ways.

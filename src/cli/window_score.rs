@@ -3,13 +3,12 @@
 
 use std::collections::BTreeMap;
 
+use super::gap_score::{ANOTHER_S, quantile};
 use crate::roadmap::LaneKind;
 use crate::roundabout::{Advice, Window};
 
 /// Windows that begin or end so soon decide whether one may enter.
 const NEAR_S: std::ops::Range<f64> = 1.0..6.0;
-/// What is off by more is of another coming.
-const ANOTHER_S: f64 = 10.0;
 
 /// Differences so far, by the kind of way that is crossed.
 #[derive(Debug, Default)]
@@ -56,14 +55,10 @@ impl WindowScore {
         let told = |off_s: &Vec<f64>| {
             let mut off_s = off_s.clone();
             off_s.sort_by(f64::total_cmp);
-            let quantile = |part: f64| {
-                let index = (part * off_s.len() as f64) as usize;
-                off_s.get(index).copied().unwrap_or(0.0)
-            };
             format!(
                 "{:.2} s median, {:.2} s at 99 % of {}",
-                quantile(0.5),
-                quantile(0.99),
+                quantile(&off_s, 0.5),
+                quantile(&off_s, 0.99),
                 off_s.len()
             )
         };
