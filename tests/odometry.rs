@@ -142,6 +142,36 @@ fn where_little_is_seen_a_drive_begins_as_fast_as_its_poses_say() {
 }
 
 #[test]
+fn a_drive_begins_as_fast_as_poses_say_however_many_came_before_it() {
+    // The first pose comes with the first column, a moment after the half of a sweep before the middle; or a single one comes
+    // with each revolution, and only the second one tells how fast it goes.
+    for (name, seed, every) in [
+        ("mini-roundabout", 32, 1),
+        ("mini-roundabout", 40, 1),
+        ("mini-roundabout", 32, 10),
+        ("two-lane-entry", 642, 10),
+        ("two-lane-entry", 648, 10),
+        ("two-lane-entry", 709, 10),
+    ] {
+        let turns = drive(name, seed, 15);
+        let mut pipeline = pipeline();
+        let mut found = None;
+        for turn in &turns {
+            // Messages of a pose are two of one time, or one.
+            let of_one = if name == "mini-roundabout" { 2 } else { 1 };
+            let poses: Vec<_> = turn.poses.chunks(of_one).collect();
+            for frame in poses.iter().rev().step_by(every).rev().copied().flatten() {
+                assert_eq!(pipeline.handle(&envelope(frame)), Ok(Outcome::Pose));
+            }
+            found = Some(place_m(&answer(&mut pipeline, &turn.clouds[0])));
+        }
+        let truth = turns[14].truth.sensor_m;
+        let off_m = distance_m([truth[0], truth[1]], found.unwrap().0);
+        assert!(off_m < 0.6, "{name} {seed}, one pose in {every}: {off_m}");
+    }
+}
+
+#[test]
 fn what_is_settled_after_the_answer_or_before_the_next_one_is_the_same() {
     let (mut early, mut late) = (pipeline(), pipeline());
     for turn in drive("strangers", 605, 25) {

@@ -109,10 +109,12 @@ impl<T: Blend> History<T> {
         self.at(self.lag.by_its_clock(time), limit)
     }
 
-    /// Whether values were known by a time of the revolutions' clock already.
-    pub(super) fn reaches(&self, time: Time) -> bool {
-        let first = self.values.first();
-        first.is_some_and(|(first, _)| *first <= self.lag.by_its_clock(time))
+    /// The part of a time of the revolutions' clock in which values are known.
+    pub(super) fn known(&self, [from, to]: [Time; 2]) -> Option<[Time; 2]> {
+        let ((first, _), (last, _)) = (self.values.first()?, self.values.last()?);
+        let behind = self.lag.by_its_clock(to) - to;
+        let by_theirs = |time: Time| time + Span::from_micros(-behind.micros());
+        Some([by_theirs(*first).max(from), by_theirs(*last).min(to)])
     }
 
     pub(super) fn last(&self) -> Option<(Time, T)> {

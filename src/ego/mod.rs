@@ -37,7 +37,7 @@ pub use sweep::{Frame, Sweep};
 use nalgebra::Vector6;
 
 use crate::cloud::Scan;
-use crate::geometry::{Outline, Rectangle};
+use crate::geometry::{Outline, Rectangle, Rigid};
 use crate::odometry::{Odometry, OdometryReport, Quality};
 use crate::parameter::{choices, parameters};
 use crate::time::{Span, Time};
@@ -151,8 +151,10 @@ pub struct EgoReport {
     pub distrusted: Option<&'static str>,
 }
 
-/// How wrong a velocity may be that poses tell: two that are 0.1 m off, half a sweep apart.
+/// How wrong a velocity may be that poses tell: two that are 0.1 m off, nearly half a sweep apart.
 const BEGIN_WITHIN_MPS: f64 = 3.0;
+/// Part of a sweep for which poses must be known to tell it: half of one, where the first came with it, less their interval.
+const LEAST_TOLD: f64 = 0.4;
 
 /// Age of the odometry frame up to which it begins anew, along the axes of the local frame, when a first pose comes.
 const YOUNG: Span = Span::from_micros(3_000_000);
@@ -273,6 +275,9 @@ impl Ego {
             }
             self.anchoring = Some(anchoring);
         }
+        if let Some((source, _)) = &sensor {
+            self.lead(*source, scan);
+        }
         self.begun.get_or_insert(end);
         self.mark(scan, moving);
         let (marked, outlines) = (&self.marked, &self.outlines);
@@ -303,8 +308,8 @@ impl Ego {
         self.sweep(scan)
     }
 
-    /// How fast the sensor goes when the frame begins, and to within what: by the way over a whole sweep, or over half of one
-    /// where poses have only begun. By a single pose it stands, or goes anyhow.
+    /// How fast the sensor goes when the frame begins, and to within what: as far as poses reach between a sweep before its
+    /// middle and its end. By a single pose it stands, or goes anyhow.
     fn begin_velocity(
         &self,
         source: Source,
@@ -312,22 +317,46 @@ impl Ego {
         middle: Time,
         swept_s: f64,
     ) -> Option<(Vector6<f64>, f64)> {
-        let velocity = |share: f64| {
-            let passed_s = share * swept_s;
-            let time = middle + Span::from_seconds(-passed_s);
-            let before = self.sources.pose_from(source, time)?;
-            let before = self.parameters.sensor(&before).rigid();
-            let within_mps = if self.sources.reaches(source, time) {
-                BEGIN_WITHIN_MPS
-            } else {
-                f64::INFINITY
-            };
-            Some((before.step_to(&sensor.rigid()) / passed_s, within_mps))
+        let around = [-1.0, 0.5].map(|sweeps| middle + Span::from_seconds(sweeps * swept_s));
+        if let Some((velocity, ..)) = self.told_motion(source, around, swept_s) {
+            return Some((velocity, BEGIN_WITHIN_MPS));
+        }
+        let before = self.sources.pose_from(source, around[0])?;
+        let before = self.parameters.sensor(&before).rigid();
+        Some((before.step_to(&sensor.rigid()) / swept_s, f64::INFINITY))
+    }
+
+    /// How fast the sensor goes in a time by a source's poses, and where it is when they end; `None` if they are known of less
+    /// than a part of a sweep.
+    fn told_motion(
+        &self,
+        source: Source,
+        time: [Time; 2],
+        swept_s: f64,
+    ) -> Option<(Vector6<f64>, Rigid, Time)> {
+        let [from, to] = self.sources.known(source, time)?;
+        let passed_s = (to - from).seconds();
+        if passed_s < LEAST_TOLD * swept_s {
+            return None;
+        }
+        let sensor = |time: Time| {
+            let vehicle = self.sources.pose_from(source, time)?;
+            Some(self.parameters.sensor(&vehicle).rigid())
         };
-        let is_known = |&(_, within_mps): &(_, f64)| within_mps.is_finite();
-        let whole = velocity(1.0);
-        let known = whole.filter(is_known);
-        known.or_else(|| velocity(0.5).filter(is_known)).or(whole)
+        let last = sensor(to)?;
+        Some((sensor(from)?.step_to(&last) / passed_s, last, to))
+    }
+
+    /// Takes the first revolution of a frame anew, where poses tell only now how fast the sensor went.
+    fn lead(&mut self, source: Source, scan: &Scan) {
+        let Some(first) = self.odometry.begun_blindly() else {
+            return;
+        };
+        let told = self.told_motion(source, [first, scan.time()], scan.duration_s());
+        if let Some((velocity, last, time)) = told {
+            let pose = last.moved(&(velocity * (first - time).seconds()));
+            self.odometry.lead(&pose, (velocity, BEGIN_WITHIN_MPS));
+        }
     }
 
     /// Does what the answer to the last revolution need not wait for ([`Odometry::settle`]).

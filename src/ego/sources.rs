@@ -344,11 +344,11 @@ impl Sources {
         })
     }
 
-    /// Whether a source was heard by a time already.
-    pub(super) fn reaches(&self, source: Source, time: Time) -> bool {
+    /// The part of a time in which a source is known, neither before its first pose nor beyond its last one.
+    pub(super) fn known(&self, source: Source, time: [Time; 2]) -> Option<[Time; 2]> {
         match source {
-            Source::Separate => self.places.reaches(time) && self.headings.reaches(time),
-            _ => self.history(source).reaches(time),
+            Source::Separate => self.headings.known(self.places.known(time)?),
+            _ => self.history(source).known(time),
         }
     }
 

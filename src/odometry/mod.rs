@@ -160,6 +160,21 @@ impl Odometry {
         self.state == State::New
     }
 
+    /// The middle of the sweep with which the frame began, if that was the last one and nothing told how fast the sensor went.
+    pub fn begun_blindly(&self) -> Option<Time> {
+        let is_blind = self.led_within_mps.is_none_or(f64::is_infinite);
+        self.time.filter(|_| self.state == State::Begun && is_blind)
+    }
+
+    /// Takes the sweep with which the frame began anew: the sensor was at `pose` in its middle, and went at a velocity that is
+    /// known to within so many m/s.
+    pub fn lead(&mut self, pose: &Rigid, velocity: (Vector6<f64>, f64)) {
+        let time = self.time;
+        self.begin(pose, Some(velocity));
+        self.time = time;
+        self.begin_map();
+    }
+
     /// Counts how often a frame began because the sensor was lost.
     pub fn epoch(&self) -> u32 {
         self.epoch
@@ -210,9 +225,7 @@ impl Odometry {
         self.thin();
         self.report = OdometryReport::default();
         if self.state == State::New {
-            self.unskew(&self.motion.clone());
-            self.map.add(&self.view, &self.motion.pose);
-            self.state = State::Begun;
+            self.begin_map();
             self.report.quality = Quality::Begun;
             return;
         }
@@ -236,6 +249,13 @@ impl Odometry {
         }
         let fits = self.take(scan, &attempt);
         self.unsettled = (self.state != State::New).then_some(Unsettled { doubtful, fits });
+    }
+
+    /// The first revolution of a frame, as it was met, becomes its map.
+    fn begin_map(&mut self) {
+        self.unskew(&self.motion.clone());
+        self.map.add(&self.view, &self.motion.pose);
+        self.state = State::Begun;
     }
 
     /// Looks at more columns in the next revolution where little is seen, and at less where much is.
