@@ -1,10 +1,9 @@
 //! A synthetic VLP-16 that drives through a scene, with the truth of every revolution.
 //!
-//! `solid` has the geometry of rays, `body` road users as solids, `terrain` and `scenery` the
-//! rest of a scene, `path` motion, `scenes` the scenes, `fixes` the vehicle's pose messages, `packets` what the sensor
-//! itself sends, `map` the true map. This
-//! file is the sensor: columns one after the other, each at its own time, while the vehicle and
-//! the scene move.
+//! `solid` has the geometry of rays, `variant` what road users look like and `body` the same as solids, `terrain` and
+//! `scenery` the rest of a scene, `path` motion, `scenes` the scenes, `fixes` the vehicle's pose messages, `packets` what the
+//! sensor itself sends, `map` the true map. This file is the sensor: columns one after the other, each at its own time, while
+//! the vehicle and the scene move.
 //!
 //! What it leaves out: second returns, rays split between two surfaces, rain and spray,
 //! reflections, other sensors' light, and vehicles that lean with a slope.
@@ -31,6 +30,8 @@ mod solid;
 
 mod terrain;
 
+pub mod variant;
+
 use crate::cloud::sensor::VLP16;
 use crate::ego::geodesy::{Geodetic, LocalFrame};
 use crate::random::Random;
@@ -43,9 +44,10 @@ use map::{Surveyor, TrueMap};
 use packets::PacketStream;
 use path::Moment;
 use path::Path;
-use scenario::{Class, PoseMessages, Scenario, Scene};
+use scenario::{PoseMessages, Scenario, Scene};
 use sight::{Carrier, Sight, Surface};
 use solid::Hit;
+use variant::Class;
 
 /// When simulated sessions begin.
 const EPOCH: Time = Time::from_micros(1_700_000_000_000_000);

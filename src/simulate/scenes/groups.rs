@@ -3,13 +3,14 @@
 use std::ops::Range;
 
 use super::actor;
-use super::chance::{between, person, range_deviation_m, stand_at_kerb};
+use super::chance::{between, car_in_bay, person, range_deviation_m, stand_at_kerb};
 use super::strangers::along_the_street;
 use crate::random::Random;
 use crate::simulate::path::Path;
-use crate::simulate::scenario::{Actor, PoseMessages, Scene, Variant};
+use crate::simulate::scenario::{Actor, PoseMessages, Scene};
 use crate::simulate::scenery::Scenery;
 use crate::simulate::terrain::Terrain;
+use crate::simulate::variant::Variant;
 
 /// From the middle of the street to the middle of what stands at the kerb, and its room along it.
 const KERB_M: f64 = 6.2;
@@ -48,7 +49,7 @@ pub(super) fn groups(random: &mut Random) -> Scene {
         for bay in 0..20 {
             let at_m = [side * KERB_M, -20.0 + BAY_M * f64::from(bay)];
             if random.uniform() < 0.3 {
-                let car = Variant::car(random);
+                let car = car_in_bay(random);
                 actors.push(actor(car, Path::parked(at_m, 90.0)));
             } else {
                 stand_at_kerb(random, &mut scenery, at_m);

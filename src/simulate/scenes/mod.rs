@@ -12,7 +12,8 @@ mod strangers;
 mod traffic;
 
 use super::path::Path;
-use super::scenario::{Actor, Scenario, Variant};
+use super::scenario::{Actor, Scenario};
+use super::variant::Variant;
 use crate::random::Random;
 
 pub(super) const ALL: &[Scenario] = &[

@@ -3,9 +3,10 @@
 use super::{RANGE_DEVIATION_M, SENSOR_M, about, actor};
 use crate::random::Random;
 use crate::simulate::path::Path;
-use crate::simulate::scenario::{PoseMessages, Scene, Variant};
+use crate::simulate::scenario::{PoseMessages, Scene};
 use crate::simulate::scenery::Scenery;
 use crate::simulate::terrain::Terrain;
+use crate::simulate::variant::Variant;
 
 pub(super) fn car_park(random: &mut Random) -> Scene {
     let terrain = Terrain {

@@ -5,9 +5,10 @@ use super::{LANE_M, RANGE_DEVIATION_M, SENSOR_M, about, actor};
 use crate::random::Random;
 use crate::roadmap::Roadmap;
 use crate::simulate::path::Path;
-use crate::simulate::scenario::{Actor, PoseMessages, Scene, Variant};
+use crate::simulate::scenario::{Actor, PoseMessages, Scene};
 use crate::simulate::scenery::Scenery;
 use crate::simulate::terrain::Terrain;
+use crate::simulate::variant::Variant;
 
 const ROUND_CENTRE_M: [f64; 2] = [-LANE_M, 45.0];
 const SMALL: Passage = Passage {

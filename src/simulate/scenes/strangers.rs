@@ -3,13 +3,15 @@
 
 use super::actor;
 use super::chance::{
-    between, lorry, parked, person, pick, range_deviation_m, stand_at_kerb, vehicle,
+    between, bus, car, car_in_bay, lorry, parked, person, pick, range_deviation_m, rider,
+    stand_at_kerb,
 };
 use crate::random::Random;
 use crate::simulate::path::Path;
-use crate::simulate::scenario::{Actor, Class, PoseMessages, Scene, Variant};
+use crate::simulate::scenario::{Actor, PoseMessages, Scene};
 use crate::simulate::scenery::Scenery;
 use crate::simulate::terrain::{Swell, Terrain};
+use crate::simulate::variant::{Build, Class};
 
 /// How far the street reaches to the north and to the south.
 const REACH_M: [f64; 2] = [-30.0, 100.0];
@@ -155,8 +157,7 @@ fn stand_behind(
             scenery.cabinet([x, y], slant_deg, sizes_m, high_m);
         }
         Some(6) if with_road_users => {
-            let variant = Variant::car(random);
-            let variant = vehicle(random, variant);
+            let variant = car_in_bay(random);
             let yaw_deg =
                 between(random, -10.0, 10.0) + if random.uniform() < 0.5 { 180.0 } else { 0.0 };
             actors.push(actor(variant, Path::parked([x, y], yaw_deg)));
@@ -201,12 +202,11 @@ pub(super) fn add_column(random: &mut Random, actors: &mut Vec<Actor>, speed_mps
         let mut along_m = between(random, 7.0, 30.0);
         for _ in 0..random.below(4) {
             let variant = match pick(random, &[0.75, 0.17, 0.04]) {
-                Some(0) => Variant::car(random),
+                Some(0) => car(random),
                 Some(1) => lorry(random),
-                Some(2) => Variant::bus(),
-                _ => Variant::cyclist(random),
+                Some(2) => bus(random),
+                _ => rider(random),
             };
-            let variant = vehicle(random, variant);
             along_m += 0.5 * variant.size_m[0];
             let at_m = [1.75 + between(random, -0.3, 0.3), direction * along_m];
             let slant_deg = between(random, -3.0, 3.0);
@@ -226,21 +226,20 @@ fn add_traffic(random: &mut Random, actors: &mut Vec<Actor>) {
     let speed_mps = between(random, 3.0, 12.0);
     for number in 0..5 {
         let variant = match pick(random, &[0.5, 0.15, 0.05]) {
-            Some(0) => Variant::car(random),
+            Some(0) => car(random),
             Some(1) => lorry(random),
-            Some(2) => Variant::bus(),
-            _ => Variant::cyclist(random),
+            Some(2) => bus(random),
+            _ => rider(random),
         };
         let begin_m = [
             -1.75,
             20.0 + 28.0 * f64::from(number) + between(random, 0.0, 8.0),
         ];
-        let speed_mps = if variant.class == Class::Cyclist {
+        let speed_mps = if variant.class == Class::Cyclist && variant.build != Build::Motorcycle {
             speed_mps.min(8.0)
         } else {
             speed_mps
         };
-        let variant = vehicle(random, variant);
         let path = Path::straight(begin_m, -90.0, speed_mps);
         let is_behind_slow = actors.last().is_some_and(|last| {
             last.path.at(1.0).speed_mps > 0.0 && last.path.at(1.0).speed_mps < speed_mps
