@@ -62,6 +62,24 @@ impl Climber {
         top_m
     }
 
+    /// Height above the ground up to which most columns of a cluster go on: a branch over a roof is none of it.
+    pub(super) fn usual_top_m(
+        &self,
+        points: &[u32],
+        scene: &Scene<'_>,
+        tops_m: &mut Vec<f32>,
+    ) -> f64 {
+        let column_of = |point: &u32| scene.scan.column(*point as usize);
+        let columns = points.chunk_by(|a, b| column_of(a) == column_of(b));
+        tops_m.clear();
+        tops_m.extend(columns.map(|column| self.top_m(column, f32::INFINITY, scene.heights_m)));
+        if tops_m.is_empty() {
+            return 0.0;
+        }
+        let middle = tops_m.len() / 2;
+        f64::from(*tops_m.select_nth_unstable_by(middle, f32::total_cmp).1)
+    }
+
     /// Takes over the points of a cluster, each followed by what goes on above it, up to the first
     /// return above `to_m`.
     pub(super) fn take_up(
@@ -147,6 +165,35 @@ mod tests {
         assert_eq!(going_on(0.0, 2.2, false), but(&[4, 5]));
         assert_eq!(going_on(10.0, 2.0, false), but(&[4]));
         assert_eq!(going_on(10.0, 2.2, true), but(&[4]));
+    }
+
+    #[test]
+    fn a_branch_over_a_part_of_a_roof_is_not_how_high_most_of_it_is() {
+        let covered = |columns: std::ops::Range<usize>| {
+            // 20 m away layers 6 to 10 pass 0.9, 1.6, 2.2, 2.9 and 3.6 m above the ground.
+            let scan = scan_of(1800, |column, layer| match layer {
+                6..=8 if (100..110).contains(&column) => 2000,
+                9..=10 if columns.contains(&column) => 2000,
+                _ => 0,
+            });
+            let own: Vec<u32> = (100..110)
+                .flat_map(|column| (6..=8).map(move |layer| (column, layer)))
+                .map(|(column, layer)| scan.index(column, layer) as u32)
+                .collect();
+            let mut members = vec![false; scan.len()];
+            for point in &own {
+                members[*point as usize] = true;
+            }
+            let mut top_m = 0.0;
+            with_scene(&scan, |scene| {
+                let mut climber = Climber::default();
+                climber.begin(scene, &members);
+                top_m = climber.usual_top_m(&own, scene, &mut vec![]);
+            });
+            top_m
+        };
+        assert!((2.1..2.4).contains(&covered(104..108)));
+        assert!((3.4..3.8).contains(&covered(100..108)));
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::Vector2;
 
+use super::above::Climber;
 use super::appearance::FEATURES;
 use super::assignment::{Assigner, Candidate};
 use super::grouping::Grouping;
@@ -33,6 +34,8 @@ pub(super) struct ObjectTracker {
     lost: Vec<Track>,
     objects: Vec<Object>,
     standing: Standing,
+    /// What goes on above clusters.
+    climber: Climber,
     grouping: Grouping,
     outline: Vec<[f64; 2]>,
     candidates: Vec<Candidate>,
@@ -128,14 +131,17 @@ impl ObjectTracker {
             track.rest(self.revolution, end, parameters.least_confidence);
         }
         self.predict(scene, end);
+        self.climber.begin(scene, clusters.members());
         self.grouping
-            .form(&self.tracks, clusters, scene, parameters);
+            .form(&self.tracks, clusters, &mut self.climber, scene, parameters);
         let origin_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
         self.pair(origin_m, parameters);
         self.update(scene, end);
         self.begin(scene, end, origin_m, parameters);
         self.tidy(end, parameters);
-        self.standing.process(clusters, scene, parameters);
+        self.standing
+            .process(clusters, &self.climber, scene, parameters);
+        self.standing.tell_looks(&mut self.tracks);
         self.publish(end, parameters);
     }
 

@@ -54,7 +54,6 @@ pub(super) struct Placer {
     /// Where the sensor is, in the local frame.
     origin_m: [f64; 2],
     thinning: Thinning,
-    climber: Climber,
     /// The points of the cluster that is being divided, and its returns.
     points: Vec<u32>,
     cluster: Placing,
@@ -80,6 +79,7 @@ impl Placer {
     pub(super) fn place(
         &mut self,
         clusters: &Clusters,
+        climber: &mut Climber,
         forecasts: &mut Forecasts,
         scene: &Scene<'_>,
         parameters: &TrackParameters,
@@ -89,19 +89,17 @@ impl Placer {
         self.placed.clear();
         self.patches.clear();
         self.thinning.begin(scene.scan);
-        self.climber.begin(scene, clusters.members());
         self.cluster.begin(scene, origin_m);
         let highest_m = parameters.highest_object_m as f32;
         for points in clusters.iter() {
             let all = points.len();
             let points = self.thinning.thin(points, scene);
             let returns_each = all as f32 / points.len() as f32;
-            let top_m = self.climber.top_m(points, highest_m, scene.heights_m);
+            let top_m = climber.top_m(points, highest_m, scene.heights_m);
             let is_too_tall = top_m > highest_m;
             // Of what is too tall just what covers something is of use.
             let to_m = if is_too_tall { CUT_M } else { highest_m };
-            self.climber
-                .take_up(points, to_m, scene.heights_m, &mut self.points);
+            climber.take_up(points, to_m, scene.heights_m, &mut self.points);
             self.cluster.place(&self.points, scene);
             let bounds = Bounds {
                 top_m,
@@ -237,11 +235,6 @@ impl Placer {
     /// The parts of all clusters.
     pub(super) fn patches(&self) -> &[Patch] {
         &self.patches
-    }
-
-    /// Of every point of the scan whether it is of a cluster, or goes on above one.
-    pub(super) fn members(&self) -> &[bool] {
-        self.climber.members()
     }
 
     /// The returns of a patch, in the order of the scan.

@@ -178,9 +178,7 @@ impl Shape {
             (self.top_below_m, self.passed_range_m) = (top_below_m, look.range_m);
         }
         if self.front_known {
-            let Range { start, end } = LORRY_TOP_M;
-            let fresh = ((self.top_m - start) / (end - start)).clamp(0.0, 1.0);
-            self.lorry += LORRY * (fresh - self.lorry);
+            self.lorry += LORRY * (lorry_share(self.top_m) - self.lorry);
         }
     }
 
@@ -299,6 +297,12 @@ impl Shape {
         self.yaw_variance =
             (self.yaw_variance + DRIFT * DRIFT * seconds).min(UNKNOWN_YAW_RAD * UNKNOWN_YAW_RAD);
     }
+}
+
+/// How much like a lorry a vehicle is by its height, from 0, a car, to 1.
+pub(super) fn lorry_share(top_m: f64) -> f64 {
+    let Range { start, end } = LORRY_TOP_M;
+    ((top_m - start) / (end - start)).clamp(0.0, 1.0)
 }
 
 /// Whether what is so high is higher than a car.

@@ -11,6 +11,7 @@ use std::ops::Range;
 
 use nalgebra::Vector2;
 
+use super::above::Climber;
 use super::appearance::Eye;
 use super::claims::Claims;
 use super::forecast::Forecasts;
@@ -84,16 +85,17 @@ impl Grouping {
         &mut self,
         tracks: &[Track],
         clusters: &Clusters,
+        climber: &mut Climber,
         scene: &Scene<'_>,
         parameters: &TrackParameters,
     ) {
         let origin_m = Vector2::from(scene.sweep.sensor.placement().origin_m());
         self.forecasts.take(tracks, origin_m, scene);
         self.placer
-            .place(clusters, &mut self.forecasts, scene, parameters);
+            .place(clusters, climber, &mut self.forecasts, scene, parameters);
         self.divide(tracks, scene, parameters);
-        let members = self.placer.members();
-        self.strays.add(tracks, members, scene, &mut self.spots);
+        self.strays
+            .add(tracks, climber.members(), scene, &mut self.spots);
         self.gather(tracks, scene);
         self.join_pieces(tracks, scene);
     }

@@ -12,8 +12,11 @@ fn patches(distance_cm: impl Fn(usize, usize) -> u16) -> (Placer, Scan) {
     with_scene(&scan, |scene| {
         let mut dbscan = Dbscan::new(&ClusterParameters::profile(Profile::Default));
         let clusters = dbscan.process(&scan, &vec![false; scan.len()], scene.heights_m);
+        let mut climber = Climber::default();
+        climber.begin(scene, clusters.members());
         placer.place(
             clusters,
+            &mut climber,
             &mut Forecasts::default(),
             scene,
             &TrackParameters::profile(Profile::Default),

@@ -84,6 +84,8 @@ pub(super) struct Track {
     born_m: Vector2<f64>,
     trails: Trails,
     trace: Trace,
+    /// Whether it looks like a vehicle, by its place.
+    pub(in crate::track) looks_like_vehicle: bool,
     existence: Existence,
     points: usize,
     /// Mean of the returns of late, where there were any.
@@ -138,6 +140,7 @@ impl Track {
             born_m: look.middle_m,
             trails: Trails::default(),
             trace: Trace::default(),
+            looks_like_vehicle: false,
             existence: Existence::new(),
             points: look.points,
             usual_points: look.points as f64,
@@ -354,6 +357,7 @@ impl Track {
         self.shape.yaw_rad = crate::ego::wrapped_rad(self.shape.yaw_rad + turn_rad);
         self.trails.reframe(moved);
         self.trace.clear();
+        self.newness.vacated.reframe();
         self.newness.reframe();
         self.born_m = Vector2::from(moved(self.born_m.into()));
         self.parted.reframe((sine, cosine), moved);

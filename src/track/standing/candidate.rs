@@ -19,6 +19,8 @@ pub(super) struct Sighting {
     pub(super) look: Look,
     /// Logarithm of the odds that it is a vehicle, by what it looks like alone.
     pub(super) log_odds: f64,
+    /// Up to where most of its columns go on.
+    pub(super) height_m: f64,
 }
 
 /// What may be a vehicle that stands.
@@ -72,7 +74,7 @@ impl Candidate {
         outline.extend(places_m(spots));
         let mut candidate = Self {
             track,
-            sides: Sides::new(outline, sighting.look.sensor_m.into()),
+            sides: Sides::new(outline, sighting.look.sensor_m.into(), sighting.height_m),
             log_odds: sighting.log_odds,
             looks: 1,
             is_empty: false,
@@ -105,7 +107,8 @@ impl Candidate {
             .measure(spots, &sighting.look, end, floor_z_m, outline);
         outline.clear();
         outline.extend(places_m(spots));
-        self.sides.see(outline, sighting.look.sensor_m.into());
+        self.sides
+            .see(outline, sighting.look.sensor_m.into(), sighting.height_m);
         self.conclude();
     }
 
@@ -139,14 +142,26 @@ impl Candidate {
         1.0 / (1.0 + libm::exp(-log_odds))
     }
 
+    /// Whether it was looked at often enough, and rather looks like a vehicle.
+    pub(super) fn looks_like_vehicle(&self) -> bool {
+        self.looks >= FEWEST_LOOKS && self.probability() > 0.5
+    }
+
+    /// How high most of it is.
+    pub(super) fn height_m(&self) -> f64 {
+        self.sides.height_m
+    }
+
     pub(super) fn place(&self) -> Rectangle {
         self.sides.place()
     }
 
-    /// Whether there is nothing left of it, or it is hardly a vehicle.
+    /// Whether there is nothing left of it, or it is hardly a vehicle, or larger than any.
     pub(super) fn is_gone(&self, parameters: &TrackParameters) -> bool {
         const HARDLY: f64 = 0.02;
-        self.track.is_gone(parameters) || self.probability() < HARDLY
+        let is_too_large = self.place().length_m > parameters.longest_object_m
+            || self.height_m() > parameters.highest_object_m;
+        self.track.is_gone(parameters) || self.probability() < HARDLY || is_too_large
     }
 
     /// Whether it was looked at often enough to be listed, and is still there.

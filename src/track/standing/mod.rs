@@ -11,6 +11,7 @@ mod sides;
 
 use nalgebra::Vector2;
 
+use super::above::Climber;
 use super::appearance::{Appearance, Eye, FEATURES};
 use super::look::Look;
 use super::nearby::Places;
@@ -37,6 +38,7 @@ pub(super) struct Standing {
     eye: Eye,
     /// Of every cluster what it looks like, if it is not too small.
     appearances: Vec<Option<Appearance>>,
+    tops_m: Vec<f32>,
     placing: Placing,
     spots: Vec<Spot>,
     sightings: Vec<Sighting>,
@@ -107,12 +109,13 @@ impl Standing {
     pub(super) fn process(
         &mut self,
         clusters: &Clusters,
+        climber: &Climber,
         scene: &Scene<'_>,
         parameters: &TrackParameters,
     ) {
         let end = scene.scan.time();
         self.predict(scene);
-        self.take_sightings(clusters, scene);
+        self.take_sightings(clusters, climber, scene);
         self.pair();
         self.update(scene, end);
         self.begin(scene, end, parameters);
@@ -133,7 +136,7 @@ impl Standing {
     }
 
     /// Looks at every cluster, and closer at those that may be a vehicle or lie where one is known.
-    fn take_sightings(&mut self, clusters: &Clusters, scene: &Scene<'_>) {
+    fn take_sightings(&mut self, clusters: &Clusters, climber: &Climber, scene: &Scene<'_>) {
         let placement = scene.sweep.sensor.placement();
         let origin_m = placement.origin_m();
         self.placing.begin(scene, origin_m);
@@ -164,6 +167,7 @@ impl Standing {
                 look: Look::at(&self.spots[spots.clone()], scene.scan, sensor_m),
                 spots,
                 log_odds,
+                height_m: climber.usual_top_m(points, scene, &mut self.tops_m),
             });
         }
     }
@@ -267,6 +271,18 @@ impl Standing {
             .retain(|lost| (end - lost.time).seconds() < MEMORY_S);
     }
 
+    /// Tells each track whether it looks like a vehicle, by what is known of its place.
+    pub(super) fn tell_looks(&self, tracks: &mut [Track]) {
+        for track in tracks.iter_mut().filter(|track| !track.rests()) {
+            let place = track.rectangle();
+            let mut there = self
+                .candidates
+                .iter()
+                .filter(|candidate| is_one_place(&candidate.place(), &place));
+            track.looks_like_vehicle = there.any(Candidate::looks_like_vehicle);
+        }
+    }
+
     /// Gives what moves now and is as likely as that the place of what stood there, with its identity if it has none
     /// that others know. What moves and is hardly a road user hides none: a piece of a hedge behind a parked car.
     pub(super) fn give_way(&mut self, tracks: &mut [Track], least_confidence: f64) {
@@ -306,6 +322,7 @@ impl Standing {
             [object.centre_m[0], object.centre_m[1]] = place.centre_m;
             object.yaw_rad = place.yaw_rad;
             (object.length_m, object.width_m) = (place.length_m, place.width_m);
+            object.height_m = object.height_m.max(candidate.height_m());
             let is_other = |other: &Object| is_one_place(&place, &other.rectangle());
             if object.existence < least_confidence || objects[..listed].iter().any(is_other) {
                 continue;

@@ -4,6 +4,7 @@ use crate::cloud::tests::later;
 use crate::cluster::{ClusterParameters, Dbscan};
 use crate::parameter::Profile;
 use crate::track::Class;
+use crate::track::above::Climber;
 use crate::track::appearance::tests::{Block, CAR, scan_of_blocks};
 use crate::track::tests::with_scene;
 
@@ -32,7 +33,10 @@ impl Street {
         let mut objects = others.to_vec();
         with_scene(&scan, |scene| {
             let clusters = dbscan.process(&scan, &vec![false; scan.len()], scene.heights_m);
-            self.standing.process(clusters, scene, &self.parameters);
+            let mut climber = Climber::default();
+            climber.begin(scene, clusters.members());
+            self.standing
+                .process(clusters, &climber, scene, &self.parameters);
         });
         let least = self.parameters.least_confidence;
         self.standing.give_way(tracks, least);
@@ -120,6 +124,33 @@ fn walls_are_not_listed() {
         ..CAR[0]
     }]);
     assert!((0..6).all(|_| street.see(&wall, &mut [], &[]).is_empty()));
+}
+
+#[test]
+fn what_is_longer_or_higher_than_any_vehicle_is_none_whatever_it_looks_like() {
+    let car = scan_of_blocks(&CAR);
+    let left = |change: fn(&mut TrackParameters)| {
+        let mut street = Street::new();
+        change(&mut street.parameters);
+        (0..3).for_each(|_| drop(street.see(&car, &mut [], &[])));
+        street.standing.candidates.len()
+    };
+    assert_eq!(left(|_| {}), 1);
+    assert_eq!(left(|parameters| parameters.longest_object_m = 3.0), 0);
+    assert_eq!(left(|parameters| parameters.highest_object_m = 1.2), 0);
+}
+
+#[test]
+fn what_stands_in_the_place_of_a_track_tells_that_it_looks_like_a_vehicle() {
+    let mut street = Street::new();
+    let car = scan_of_blocks(&CAR);
+    let mut tracks = [mover(&car, 0.0)];
+    (0..2).for_each(|_| drop(street.see(&car, &mut [], &[])));
+    street.standing.tell_looks(&mut tracks);
+    assert!(!tracks[0].looks_like_vehicle);
+    street.see(&car, &mut [], &[]);
+    street.standing.tell_looks(&mut tracks);
+    assert!(tracks[0].looks_like_vehicle);
 }
 
 #[test]
