@@ -127,6 +127,23 @@ fn walls_are_not_listed() {
 }
 
 #[test]
+fn poor_looks_do_not_erase_what_many_clear_ones_told() {
+    let mut street = Street::new();
+    let car = scan_of_blocks(&CAR);
+    street.see(&car, &mut [], &[]);
+    let standing = &mut street.standing;
+    let (candidate, mut sighting) = (&mut standing.candidates[0], standing.sightings[0].clone());
+    let mut judged = |log_odds: f64, times: usize| {
+        sighting.log_odds = log_odds;
+        (0..times).for_each(|_| candidate.judge(&sighting));
+        candidate.probability()
+    };
+    assert!(judged(3.0, 10) > 0.9);
+    assert!(judged(-2.0, 3) > 0.5);
+    assert!(judged(-2.0, 10) < 0.5);
+}
+
+#[test]
 fn what_is_longer_or_higher_than_any_vehicle_is_none_whatever_it_looks_like() {
     let car = scan_of_blocks(&CAR);
     let left = |change: fn(&mut TrackParameters)| {
