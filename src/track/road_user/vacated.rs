@@ -28,8 +28,8 @@ const LASTING: f64 = 0.9;
 const MOST_LEFT: f64 = 0.6;
 
 /// How much farther than its own length what is long must have gone: the middle of a box that grows is not where it was
-/// thought to be. Without, in slow columns 28 instead of 72 % of lorries are listed, and 95 instead of 99 % of cars, most of them
-/// as if they stood (`overgrown`, seeds 61 to 68).
+/// thought to be. Without, in slow columns 28 instead of 72 % of lorries are listed, and 95 instead of 99 % of cars, most of
+/// them as if they stood (`overgrown`, seeds 61 to 68).
 const FAR_M: f64 = 2.5;
 /// How near it must be, and look like a vehicle: behind the sensor another part of what stands is seen at every look.
 const CLEAR_RANGE_M: f64 = 25.0;

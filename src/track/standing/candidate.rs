@@ -49,8 +49,8 @@ pub(super) const LEAST_LOG: f64 = -1.5;
 /// Looks that the mean of late reaches back: a single one may be of any part.
 const REACH: f64 = 3.0;
 /// What half of that mean and half of the one of all looks counts, and what is added to it for the first look and, times its
-/// logarithm, for their number: things that only look like a vehicle for a moment are more than vehicles. Chosen among 60 sets on
-/// the candidates of 24 simulated streets: of those that are vehicles 94 instead of 89 % are held for one, at as many that are
+/// logarithm, for their number: things that only look like a vehicle for a moment are more than vehicles. Chosen among 60 sets
+/// on the candidates of 24 simulated streets: of those that are vehicles 94 instead of 89 % are held for one, at as many that are
 /// none, by both means instead of the first alone; in the shared recordings kitti and kitti1 70 and 54 instead of 69 and 52 %.
 /// `scripts/evaluate` prints how right it is.
 const LOOKS_LOG: f64 = 1.2;
