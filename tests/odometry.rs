@@ -106,18 +106,28 @@ fn a_drive_without_poses_is_followed_to_half_a_per_cent() {
 }
 
 #[test]
-fn a_drive_that_begins_between_hedges_and_walls_is_not_taken_for_standing() {
-    // Little tells the motion along them at first; without another look it stood for many seconds.
-    let turns = drive("strangers", 618, 35);
-    let mut pipeline = pipeline();
-    let places_m: Vec<_> = turns
-        .iter()
-        .map(|turn| place_m(&feed(&mut pipeline, turn, false)))
-        .collect();
-    let later: Vec<&Turn> = turns.iter().skip(25).collect();
-    let [truly, found] = ways_m(&later, &places_m[25..]);
-    let off_m = distance_m(truly, found);
-    assert!(truly[0] > 4.0 && off_m < 0.3, "{truly:?} {found:?}");
+fn a_motion_that_is_followed_is_doubted_only_where_another_one_clearly_fits_better() {
+    // The first begins with a wrong motion; in the open others seem to fit a little better than the right one.
+    for (name, seed) in [
+        ("mini-roundabout", 43),
+        ("two-lane-entry", 645),
+        ("two-lane-entry", 663),
+        ("two-lane-entry", 665),
+    ] {
+        let turns = drive(name, seed, 35);
+        let mut pipeline = pipeline();
+        let places_m: Vec<_> = turns
+            .iter()
+            .map(|turn| place_m(&feed(&mut pipeline, turn, false)))
+            .collect();
+        let later: Vec<&Turn> = turns.iter().skip(25).collect();
+        let [truly, found] = ways_m(&later, &places_m[25..]);
+        let off_m = distance_m(truly, found);
+        assert!(
+            truly[0] > 3.0 && off_m < 0.3,
+            "{name} {seed}: {truly:?} {found:?}"
+        );
+    }
 }
 
 #[test]

@@ -126,6 +126,8 @@ pub struct Ego {
     source: Option<Source>,
     /// When the odometry frame began.
     begun: Option<Time>,
+    /// The source by which it began with the last revolution, without telling how fast the sensor goes.
+    begun_blindly: Option<Source>,
     epoch: u32,
     /// Columns in which something that moves may be, and its outlines.
     marked: Vec<bool>,
@@ -188,6 +190,7 @@ impl Ego {
             past_jumps: 0,
             source: None,
             begun: None,
+            begun_blindly: None,
             epoch: 0,
             marked: vec![],
             outlines: vec![],
@@ -200,6 +203,7 @@ impl Ego {
         self.keep_jumps();
         self.anchoring = None;
         self.begun = None;
+        self.begun_blindly = None;
         self.epoch = self.epoch.wrapping_add(1);
     }
 
@@ -262,6 +266,7 @@ impl Ego {
         let sensor = heard.map(|(source, vehicle)| (source, self.parameters.sensor(&vehicle)));
         let is_young = self.begun.is_none_or(|begun| (end - begun) < YOUNG);
         let begins = self.odometry.begins() || (self.anchoring.is_none() && is_young);
+        let begun_blindly = self.begun_blindly.take();
         if let (Some((source, sensor)), true) = (&sensor, begins) {
             if !self.odometry.begins() {
                 self.epoch = self.epoch.wrapping_add(1);
@@ -269,14 +274,16 @@ impl Ego {
             self.keep_jumps();
             let velocity = self.begin_velocity(*source, sensor, middle, scan.duration_s());
             self.odometry.begin(&sensor.rigid(), velocity);
+            let is_known = velocity.is_some_and(|(_, within_mps)| within_mps.is_finite());
+            self.begun_blindly = (!is_known).then_some(*source);
             let mut anchoring = Anchoring::begin(source.frame(), &self.parameters);
             if velocity.is_none() {
                 anchoring.doubt_begin();
             }
             self.anchoring = Some(anchoring);
         }
-        if let Some((source, _)) = &sensor {
-            self.lead(*source, scan);
+        if begun_blindly.is_some() && begun_blindly == self.source {
+            self.lead(scan);
         }
         self.begun.get_or_insert(end);
         self.mark(scan, moving);
@@ -348,8 +355,8 @@ impl Ego {
     }
 
     /// Takes the first revolution of a frame anew, where poses tell only now how fast the sensor went.
-    fn lead(&mut self, source: Source, scan: &Scan) {
-        let Some(first) = self.odometry.begun_blindly() else {
+    fn lead(&mut self, scan: &Scan) {
+        let (Some(source), Some(first)) = (self.source, self.odometry.begun_at()) else {
             return;
         };
         let told = self.told_motion(source, [first, scan.time()], scan.duration_s());
@@ -369,11 +376,6 @@ impl Ego {
         self.marked.clear();
         self.marked.resize(scan.columns(), false);
         self.outlines.clear();
-        let moving = if self.odometry.was_lost() {
-            &[]
-        } else {
-            moving
-        };
         self.outlines.extend(moving.iter().map(Rectangle::outline));
         for rectangle in moving {
             match scan.columns_across(&rectangle.corners()) {

@@ -160,10 +160,9 @@ impl Odometry {
         self.state == State::New
     }
 
-    /// The middle of the sweep with which the frame began, if that was the last one and nothing told how fast the sensor went.
-    pub fn begun_blindly(&self) -> Option<Time> {
-        let is_blind = self.led_within_mps.is_none_or(f64::is_infinite);
-        self.time.filter(|_| self.state == State::Begun && is_blind)
+    /// The middle of the sweep with which the frame began, if that was the last one.
+    pub fn begun_at(&self) -> Option<Time> {
+        self.time.filter(|_| self.state == State::Begun)
     }
 
     /// Takes the sweep with which the frame began anew: the sensor was at `pose` in its middle, and went at a velocity that is

@@ -6,8 +6,8 @@ use super::motion::Motion;
 use super::{Attempt, Odometry, registration};
 use crate::geometry;
 
-/// How much better another motion must fit than the first: where the sensor was jerked, and where the frame begins or would
-/// have begun with a wrong one.
+/// How much better another motion must fit than the first: where the sensor was jerked or is followed, and where the frame
+/// begins.
 const CLEARLY: f64 = 1.25;
 const SLIGHTLY: f64 = 1.05;
 
@@ -20,11 +20,14 @@ pub(super) enum Reach {
     Jerk,
 }
 
-/// Whether two attempts are different motions, and not one that was found a little better.
-pub(super) fn is_other(a: &Attempt, b: &Attempt) -> bool {
+/// Whether one attempt is another motion than a second one, not the same that was found a little better, and clearly fits
+/// better.
+pub(super) fn is_clearly_another(one: &Attempt, second: &Attempt) -> bool {
     const OTHER_MPS: f64 = 1.0;
-    let off = geometry::linear(&(a.motion.velocity - b.motion.velocity));
+    let off = geometry::linear(&(one.motion.velocity - second.motion.velocity));
+    let share = |attempt: &Attempt| attempt.alignment.agreement.map(|found| found.share);
     off.norm_squared() > OTHER_MPS * OTHER_MPS
+        && share(one) > share(second).map(|least| CLEARLY * least)
 }
 
 impl Odometry {

@@ -275,11 +275,9 @@ impl Standing {
     pub(super) fn tell_looks(&self, tracks: &mut [Track]) {
         for track in tracks.iter_mut().filter(|track| !track.rests()) {
             let place = track.rectangle();
-            let mut there = self
-                .candidates
-                .iter()
-                .filter(|candidate| is_one_place(&candidate.place(), &place));
-            track.looks_like_vehicle = there.any(Candidate::looks_like_vehicle);
+            track.looks_like_vehicle = self.candidates.iter().any(|candidate| {
+                candidate.looks_like_vehicle() && is_one_place(&candidate.place(), &place)
+            });
         }
     }
 
