@@ -2,10 +2,13 @@
 //!
 //! `reading` brings every pose message to one set of units, `geodesy` WGS84 to the local frame,
 //! `history` reads between and beyond what was heard and `lag` follows its clock, `senders` says whom to listen to, `sources`
-//! chooses among them and `trust` says whether one goes as the sensor does, `rates` learns what speeds mean. The odometry frame is tied to
-//! the local frame by an `anchor` (the frames `odom` and `map` of ROS REP 105). `sweep` is the answer.
+//! chooses among them and `trust` says whether one goes as the sensor does, `rates` learns what speeds mean. The odometry
+//! frame is tied to the local frame by an `anchor` (the frames `odom` and `map` of ROS REP 105); `beginning` says how fast
+//! it begins. `sweep` is the answer.
 
 mod anchor;
+
+mod beginning;
 
 pub mod geodesy;
 
@@ -34,10 +37,8 @@ pub use pose::{Placement, Pose, wrapped_rad};
 pub use refusal::PoseRefusal;
 pub use sweep::{Frame, Sweep};
 
-use nalgebra::Vector6;
-
 use crate::cloud::Scan;
-use crate::geometry::{Outline, Rectangle, Rigid};
+use crate::geometry::{Outline, Rectangle};
 use crate::odometry::{Odometry, OdometryReport, Quality};
 use crate::parameter::{choices, parameters};
 use crate::time::{Span, Time};
@@ -152,11 +153,6 @@ pub struct EgoReport {
     /// A source that does not go as the sensor does, and is not used.
     pub distrusted: Option<&'static str>,
 }
-
-/// How wrong a velocity may be that poses tell: two that are 0.1 m off, nearly half a sweep apart.
-const BEGIN_WITHIN_MPS: f64 = 3.0;
-/// Part of a sweep for which poses must be known to tell it: half of one, where the first came with it, less their interval.
-const LEAST_TOLD: f64 = 0.4;
 
 /// Age of the odometry frame up to which it begins anew, along the axes of the local frame, when a first pose comes.
 const YOUNG: Span = Span::from_micros(3_000_000);
@@ -313,57 +309,6 @@ impl Ego {
                 .take(middle, &pose, source.frame(), sensor, &self.parameters);
         }
         self.sweep(scan)
-    }
-
-    /// How fast the sensor goes when the frame begins, and to within what: as far as poses reach between a sweep before its
-    /// middle and its end. By a single pose it stands, or goes anyhow.
-    fn begin_velocity(
-        &self,
-        source: Source,
-        sensor: &Pose,
-        middle: Time,
-        swept_s: f64,
-    ) -> Option<(Vector6<f64>, f64)> {
-        let around = [-1.0, 0.5].map(|sweeps| middle + Span::from_seconds(sweeps * swept_s));
-        if let Some((velocity, ..)) = self.told_motion(source, around, swept_s) {
-            return Some((velocity, BEGIN_WITHIN_MPS));
-        }
-        let before = self.sources.pose_from(source, around[0])?;
-        let before = self.parameters.sensor(&before).rigid();
-        Some((before.step_to(&sensor.rigid()) / swept_s, f64::INFINITY))
-    }
-
-    /// How fast the sensor goes in a time by a source's poses, and where it is when they end; `None` if they are known of less
-    /// than a part of a sweep.
-    fn told_motion(
-        &self,
-        source: Source,
-        time: [Time; 2],
-        swept_s: f64,
-    ) -> Option<(Vector6<f64>, Rigid, Time)> {
-        let [from, to] = self.sources.known(source, time)?;
-        let passed_s = (to - from).seconds();
-        if passed_s < LEAST_TOLD * swept_s {
-            return None;
-        }
-        let sensor = |time: Time| {
-            let vehicle = self.sources.pose_from(source, time)?;
-            Some(self.parameters.sensor(&vehicle).rigid())
-        };
-        let last = sensor(to)?;
-        Some((sensor(from)?.step_to(&last) / passed_s, last, to))
-    }
-
-    /// Takes the first revolution of a frame anew, where poses tell only now how fast the sensor went.
-    fn lead(&mut self, scan: &Scan) {
-        let (Some(source), Some(first)) = (self.source, self.odometry.begun_at()) else {
-            return;
-        };
-        let told = self.told_motion(source, [first, scan.time()], scan.duration_s());
-        if let Some((velocity, last, time)) = told {
-            let pose = last.moved(&(velocity * (first - time).seconds()));
-            self.odometry.lead(&pose, (velocity, BEGIN_WITHIN_MPS));
-        }
     }
 
     /// Does what the answer to the last revolution need not wait for ([`Odometry::settle`]).

@@ -2,9 +2,11 @@
 //!
 //! `features` and `poles` pick returns that tell something, `map` keeps what stands: `surfaces` and `uprights` in
 //! `cells`. `registration` finds the pose from which the one lies on the other, `motion` knows where that must be
-//! about, `search` looks farther where the sensor was jerked, and `doubts` asks it whether the first motion was right.
+//! about, `search` looks farther where the sensor was jerked; `beginning` begins a frame, and `doubts` asks whether the
+//! first motion was right.
 //! This file takes a revolution through them, in the manner of KISS-ICP (Vizzo et al. 2023).
 
+mod beginning;
 mod cells;
 mod doubts;
 mod features;
@@ -137,43 +139,6 @@ impl Default for Odometry {
 }
 
 impl Odometry {
-    /// Begins a new frame, in which the sensor is at `pose` in the middle of the next sweep, and at a velocity (metres and
-    /// radians a second, in that frame) if that is known, to within so many m/s.
-    pub fn begin(&mut self, pose: &Rigid, velocity: Option<(Vector6<f64>, f64)>) {
-        self.motion = Motion::begin(*pose, velocity.map(|(velocity, _)| velocity));
-        self.led_within_mps = velocity.map(|(_, within_mps)| within_mps);
-        (self.followed, self.doubted) = (0, 0);
-        self.time = None;
-        self.map.clear();
-        self.state = State::New;
-        (self.usual_off_m, self.usual_agreement) = (FIRST_OFF_M, Agreement::default());
-        self.unsettled = None;
-    }
-
-    /// Whether the frame began at a velocity that was told.
-    fn is_led(&self) -> bool {
-        self.led_within_mps.is_some()
-    }
-
-    /// Whether the next scan begins a frame.
-    pub fn begins(&self) -> bool {
-        self.state == State::New
-    }
-
-    /// The middle of the sweep with which the frame began, if that was the last one.
-    pub fn begun_at(&self) -> Option<Time> {
-        self.time.filter(|_| self.state == State::Begun)
-    }
-
-    /// Takes the sweep with which the frame began anew: the sensor was at `pose` in its middle, and went at a velocity that is
-    /// known to within so many m/s.
-    pub fn lead(&mut self, pose: &Rigid, velocity: (Vector6<f64>, f64)) {
-        let time = self.time;
-        self.begin(pose, Some(velocity));
-        self.time = time;
-        self.begin_map();
-    }
-
     /// Counts how often a frame began because the sensor was lost.
     pub fn epoch(&self) -> u32 {
         self.epoch
@@ -248,13 +213,6 @@ impl Odometry {
         }
         let fits = self.take(scan, &attempt);
         self.unsettled = (self.state != State::New).then_some(Unsettled { doubtful, fits });
-    }
-
-    /// The first revolution of a frame, as it was met, becomes its map.
-    fn begin_map(&mut self) {
-        self.unskew(&self.motion.clone());
-        self.map.add(&self.view, &self.motion.pose);
-        self.state = State::Begun;
     }
 
     /// Looks at more columns in the next revolution where little is seen, and at less where much is.

@@ -4,8 +4,9 @@ use super::{rounded, solid, wheels};
 use crate::simulate::solid::{Fabric, Solid, block};
 use crate::simulate::variant::{Build, Freight, LorryBuild, Variant};
 
-/// Longer lorries have a semi-trailer, and so do those above this height of which buses are not.
+/// Longer lorries have a semi-trailer.
 const LONGEST_RIGID_M: f64 = 10.0;
+/// What is as long and higher is one, too, and no bus.
 const HIGHEST_BUS_M: f64 = 3.35;
 
 pub(super) fn parts(variant: &Variant) -> Vec<Solid> {
