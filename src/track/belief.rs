@@ -265,6 +265,12 @@ impl Belief {
         (car + large) / self.road_user().max(1e-9)
     }
 
+    /// Probability, among the classes that are known, of being a lorry or a bus.
+    pub(super) fn lorry(&self) -> f64 {
+        let [_, _, _, large] = self.road_users;
+        large / self.road_users.iter().sum::<f64>().max(1e-9)
+    }
+
     /// The likeliest class and its probability among road users.
     pub(super) fn class(&self) -> (Class, f64) {
         /// Below this nobody can tell.

@@ -49,8 +49,8 @@ impl Track {
         }
         let view = View::of(look, spots, self.shape.yaw_rad);
         let before = self.shape.size_m(self.belief.vehicle());
-        let is_vehicle = self.is_vehicle();
-        self.shape.learn(&view, look, is_vehicle);
+        let (is_vehicle, lorry) = (self.is_vehicle(), self.belief.lorry());
+        self.shape.learn(&view, look, is_vehicle, lorry);
         let after = self.shape.size_m(self.belief.vehicle());
         self.keep_near_edges(look, before, after);
         let (centre_m, noise) = self.centre(&view, self.motion.estimate().position_m);

@@ -181,3 +181,28 @@ fn who_stands_apart_is_as_wide_as_seen_within_a_second_and_a_car_stays_as_it_was
     assert!(wide_m(car, 1.5, true) < 1.2);
     assert!(wide_m(car, 1.07, true) > 1.03);
 }
+
+#[test]
+fn what_drives_ahead_and_is_as_high_as_a_lorry_is_as_long_as_one() {
+    // The rear of something so wide that drives off at 8 m/s, from 34 m away on.
+    let length_m = |width_m: f64, layers: std::ops::Range<usize>| {
+        let met = |revolution: u16| {
+            let range_cm = 3400 + 80 * revolution;
+            let half = 0.5 * width_m / (0.01 * f64::from(range_cm));
+            let half = (half.to_degrees() / 0.2).round() as usize;
+            scan_of(1800, |column, layer| {
+                let is_met = (900 - half..900 + half).contains(&column);
+                if is_met && layers.contains(&layer) {
+                    range_cm
+                } else {
+                    0
+                }
+            })
+        };
+        let (track, _) = followed(&(0..20).map(met).collect::<Vec<_>>());
+        track.rectangle().length_m
+    };
+    let (lorry_m, car_m) = (length_m(2.5, 6..9), length_m(1.8, 6..8));
+    assert!(lorry_m > 7.7, "{lorry_m}");
+    assert!(car_m < 5.0, "{car_m}");
+}
