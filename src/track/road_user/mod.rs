@@ -240,6 +240,11 @@ impl Track {
         self.shape.top_m
     }
 
+    /// Where the lowest ray passed over it that ever did.
+    pub(super) fn top_below_m(&self) -> f64 {
+        self.shape.top_below_m
+    }
+
     pub(super) fn yaw_rad(&self) -> f64 {
         self.shape.yaw_rad
     }

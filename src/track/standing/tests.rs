@@ -74,6 +74,19 @@ fn a_car_is_listed_after_three_looks_keeps_its_id_and_does_not_move() {
 }
 
 #[test]
+fn what_rays_passed_over_lower_than_any_car_is_none() {
+    let listed = |high_m: f64| {
+        let block = Block {
+            heights_m: [0.2, high_m],
+            ..CAR[0]
+        };
+        let (mut street, scan) = (Street::new(), scan_of_blocks(&[block]));
+        (0..8).fold(0, |_, _| street.see(&scan, &mut [], &[]).len())
+    };
+    assert_eq!([1.3, 0.9, 0.5].map(listed), [1, 1, 0]);
+}
+
+#[test]
 fn what_lies_in_the_middle_of_a_box_does_not_take_the_place_of_what_was_seen_there() {
     let mut street = Street::new();
     let car = scan_of_blocks(&CAR);
