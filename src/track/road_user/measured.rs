@@ -55,7 +55,7 @@ impl Track {
         self.keep_near_edges(look, before, after);
         let (centre_m, noise) = self.centre(&view, self.motion.estimate().position_m);
         self.motion.measure_position(centre_m, noise);
-        self.trails.push(centre_m, look);
+        self.trails.push(centre_m, look, seen_at);
         self.steer();
         self.existence.see();
         self.last_measured = seen_at;

@@ -157,7 +157,7 @@ impl Track {
         track.belief = Belief::of(&track.qualities());
         let view = View::of(look, spots, track.shape.yaw_rad);
         let (centre_m, noise) = track.centre(&view, look.middle_m);
-        track.trails.begin(centre_m);
+        track.trails.begin(centre_m, time);
         track.born_m = centre_m;
         let birth_mps = if track.is_vehicle() {
             VEHICLE_BIRTH_MPS
