@@ -60,7 +60,7 @@ const MORE_LOG: f64 = 0.55;
 /// Where the lowest ray passed over it that ever did: no car is lower, though rays may pass through the windows above its
 /// belt. With it, 1.78 instead of 1.99 objects a revolution are false in `overgrown` (seeds 61 to 68), 1.33 instead of 1.40 in
 /// `pavement` (61 to 64), and as many vehicles are found there and in the shared recordings.
-const PASSED_M: Within = Within(1.05, f64::MAX, 0.1);
+pub(super) const PASSED_M: Within = Within(1.05, f64::INFINITY, 0.1);
 /// More looks say nothing new.
 const MOST_LOOKS: u32 = 20;
 /// What went on faster since its first look drives; of what stands another part is seen at every look, but it gets

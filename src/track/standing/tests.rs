@@ -6,6 +6,8 @@ use crate::parameter::Profile;
 use crate::track::Class;
 use crate::track::above::Climber;
 use crate::track::appearance::tests::{Block, CAR, scan_of_blocks};
+use crate::track::look::{COVERED_M, OUT_OF_VIEW_M};
+use crate::track::standing::candidate::PASSED_M;
 use crate::track::tests::with_scene;
 
 struct Street {
@@ -84,6 +86,8 @@ fn what_rays_passed_over_lower_than_any_car_is_none() {
         (0..8).fold(0, |_, _| street.see(&scan, &mut [], &[]).len())
     };
     assert_eq!([1.3, 0.9, 0.5].map(listed), [1, 1, 0]);
+    assert_eq!(PASSED_M.log(OUT_OF_VIEW_M), 0.0);
+    assert_eq!(PASSED_M.log(COVERED_M), 0.0);
 }
 
 #[test]
