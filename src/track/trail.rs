@@ -8,17 +8,18 @@ use crate::time::Time;
 /// The last places of something, and when it was there.
 #[derive(Debug, Clone, Copy, Default)]
 struct Trail {
-    places: [Step; Trail::LONGEST],
+    places: [Waypoint; Trail::LONGEST],
     count: usize,
 }
 
+/// A place, and when something was there.
 #[derive(Debug, Clone, Copy, Default)]
-struct Step {
+struct Waypoint {
     at_m: Vector2<f64>,
     time: Time,
 }
 
-impl Step {
+impl Waypoint {
     /// Way and time to the next one.
     fn to(&self, next: &Self) -> (f64, f64) {
         (
@@ -36,12 +37,12 @@ impl Trail {
             self.places.rotate_left(1);
             self.count -= 1;
         }
-        self.places[self.count] = Step { at_m, time };
+        self.places[self.count] = Waypoint { at_m, time };
         self.count += 1;
     }
 
     fn reframe(&mut self, moved: impl Fn([f64; 2]) -> [f64; 2]) {
-        for Step { at_m, .. } in &mut self.places[..self.count] {
+        for Waypoint { at_m, .. } in &mut self.places[..self.count] {
             *at_m = Vector2::from(moved((*at_m).into()));
         }
     }
