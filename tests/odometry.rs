@@ -85,17 +85,21 @@ fn distance_m(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
+/// The true way and the one found without poses, after so many revolutions.
+fn ways_without_poses_m(turns: &[Turn], skipped: usize) -> [[f64; 2]; 2] {
+    let mut pipeline = pipeline();
+    let places_m: Vec<_> = turns
+        .iter()
+        .map(|turn| place_m(&feed(&mut pipeline, turn, false)))
+        .collect();
+    let later: Vec<&Turn> = turns.iter().skip(skipped).collect();
+    ways_m(&later, &places_m[skipped..])
+}
+
 #[test]
 fn a_drive_without_poses_is_followed_to_half_a_per_cent() {
     for name in ["street", "roundabout", "car-park", "hill"] {
-        let turns = drive(name, 5, 200);
-        let mut pipeline = pipeline();
-        let places_m: Vec<_> = turns
-            .iter()
-            .map(|turn| place_m(&feed(&mut pipeline, turn, false)))
-            .collect();
-        let later: Vec<&Turn> = turns.iter().skip(20).collect();
-        let [truly, found] = ways_m(&later, &places_m[20..]);
+        let [truly, found] = ways_without_poses_m(&drive(name, 5, 200), 20);
         let off_m = distance_m(truly, found);
         println!("{name}: {truly:?} {found:?}: {off_m:.3} m off");
         assert!(
@@ -114,14 +118,7 @@ fn a_motion_that_is_followed_is_doubted_only_where_another_one_clearly_fits_bett
         ("two-lane-entry", 663),
         ("two-lane-entry", 665),
     ] {
-        let turns = drive(name, seed, 35);
-        let mut pipeline = pipeline();
-        let places_m: Vec<_> = turns
-            .iter()
-            .map(|turn| place_m(&feed(&mut pipeline, turn, false)))
-            .collect();
-        let later: Vec<&Turn> = turns.iter().skip(25).collect();
-        let [truly, found] = ways_m(&later, &places_m[25..]);
+        let [truly, found] = ways_without_poses_m(&drive(name, seed, 35), 25);
         let off_m = distance_m(truly, found);
         assert!(
             truly[0] > 3.0 && off_m < 0.3,

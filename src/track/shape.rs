@@ -37,12 +37,12 @@ pub(super) const CAR_M: [f64; 2] = [4.3, 1.8];
 /// Standard deviation of a car's length and width around it.
 const CAR_DEVIATION_M: [f64; 2] = [0.4, 0.1];
 /// The same of what drives and is as high as a lorry or a bus: 7 to 12 m (Directive 96/53/EC). With 10 m, hill's HOTA is
-/// 65.7 instead of 67.5 (`scripts/evaluate --seeds 31-42`); its lorry has 7.5 m, that of street 12 m.
+/// 65.7 instead of 67.5 (seeds 31 to 42); its lorry has 7.5 m, that of street 12 m.
 const LORRY_M: [f64; 2] = [9.0, 2.5];
 const LORRY_DEVIATION_M: [f64; 2] = [1.5, 0.1];
 /// From a car's height to that of a lorry; vans are in between.
 const LORRY_TOP_M: Range<f64> = 2.1..3.1;
-/// How much higher than its highest return it is: half of what lies between two layers 20 m away.
+/// How much higher than its highest return it is: half of what lies between two layers 17 m away.
 const ABOVE_TOP_M: f64 = 0.3;
 /// Standard deviation of a direction that nobody knows: uniform over a half turn.
 pub(super) const UNKNOWN_YAW_RAD: f64 = 0.9;
