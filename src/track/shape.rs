@@ -42,7 +42,8 @@ const LORRY_M: [f64; 2] = [9.0, 2.5];
 const LORRY_DEVIATION_M: [f64; 2] = [1.5, 0.1];
 /// From a car's height to that of a lorry; vans are in between.
 const LORRY_TOP_M: Range<f64> = 2.1..3.1;
-/// How much higher than its highest return it is: half of what lies between two layers 17 m away.
+/// How much higher than its highest return it is: half of what lies between two layers 17 m away. Without, 62 instead of 82 %
+/// of the lorries of `street` are listed where they are (seeds 31 to 42).
 const ABOVE_TOP_M: f64 = 0.3;
 /// Standard deviation of a direction that nobody knows: uniform over a half turn.
 pub(super) const UNKNOWN_YAW_RAD: f64 = 0.9;
@@ -97,7 +98,8 @@ impl Shape {
     /// `vehicle` is the probability that it is one.
     pub(super) fn size_m(&self, vehicle: f64) -> [f64; 2] {
         [0, 1].map(|axis| {
-            // What drives and is a lorry is one at its whole length, though nobody may know it for sure.
+            // What drives and is a lorry has its whole length, though nobody may be sure of it: else 66 instead of 82 % of
+            // the lorries of `street` are listed where they are.
             let hidden = (1.0 - self.whole[axis]) * vehicle.max(self.lorry);
             let assumed_m = self.between(CAR_M, LORRY_M)[axis];
             let missing_m = (assumed_m - self.seen_m[axis]).max(0.0);
@@ -182,6 +184,7 @@ impl Shape {
             (self.top_below_m, self.passed_range_m) = (top_below_m, look.range_m);
         }
         if self.front_known {
+            // By its height alone false movers in a yard are half as many again, and people in groups 61 instead of 63 %.
             let share = lorry * lorry_share(self.top_m + ABOVE_TOP_M);
             self.lorry += LORRY * (share - self.lorry);
         }
